@@ -1,0 +1,1 @@
+"""Datasets: design, parallel generation, storage and checks."""

@@ -1,0 +1,87 @@
+"""The one place where Numba is configured.
+
+`@kernel` compiles without the interpreter lock, so that Dask threads run side by side, and with
+the NumPy error model, so that a division by zero gives inf (which drivers turn into a status).
+No fast-math: results must be the same from run to run.
+
+Compiled code is cached in a folder named by the hash of every kernel source. Numba's own cache
+only watches the file of the outermost function, so an edit in an imported kernel would go
+unnoticed; a hash over all sources cannot.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar, cast
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+_PACKAGE = Path(__file__).resolve().parent
+_SOURCES = ("explosive", "kernel.py", "nearfield", "burden", "muckpile")
+
+
+@cache
+def source_hash() -> str:
+    """SHA-256 over every source that can change a simulated number (hex, 64 characters)."""
+    digest = hashlib.sha256()
+    for entry in _SOURCES:
+        path = _PACKAGE / entry
+        for source in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
+            digest.update(source.relative_to(_PACKAGE).as_posix().encode())
+            digest.update(source.read_bytes())
+    return digest.hexdigest()
+
+
+def _cache_root() -> Path:
+    base = os.environ.get("CASTBLAST_CACHE_DIR")
+    if base:
+        return Path(base)
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA", Path.home())) / "castblast"
+    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "castblast"
+
+
+@cache
+def _prepare_cache() -> str:
+    """Name the cache folder before Numba is imported and return it."""
+    folder = _cache_root() / "kernels" / source_hash()[:16]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError:
+        folder = Path(tempfile.gettempdir()) / f"castblast-kernels-{source_hash()[:16]}"
+        folder.mkdir(parents=True, exist_ok=True)
+    os.environ["NUMBA_CACHE_DIR"] = str(folder)
+    return str(folder)
+
+
+def kernel(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Compile `function` for one thread without the interpreter lock; types stay visible."""
+    return _compile(function, parallel=False)
+
+
+def parallel_kernel(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Compile `function` with `prange`; only for code that Dask never maps (the muckpile)."""
+    return _compile(function, parallel=True)
+
+
+def _compile(function: Callable[_P, _R], *, parallel: bool) -> Callable[_P, _R]:
+    folder = _prepare_cache()
+    import numba
+
+    # An earlier import of numba has read its settings already.
+    numba.config.CACHE_DIR = folder  # type: ignore[attr-defined]
+    options: dict[str, Any] = {
+        "nogil": True,
+        "cache": True,
+        "error_model": "numpy",
+        "parallel": parallel,
+    }
+    return cast("Callable[_P, _R]", numba.njit(**options)(function))

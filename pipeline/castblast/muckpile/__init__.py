@@ -1,0 +1,1 @@
+"""Muckpile: a discrete-element model of the thrown rock with rolling resistance."""

@@ -1,0 +1,92 @@
+"""Inputs of the near-field model: rock, hole, and settings of the solver. SI units, radians."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple
+
+
+class EndMode(IntEnum):
+    """When a near-field run ends.
+
+    PAPER: at 0.9 of the travel time of the p-wave to the outer boundary. EQUILIBRIUM: when the
+    hole wall has come to rest, on a body large enough for that.
+    """
+
+    PAPER = 0
+    EQUILIBRIUM = 1
+
+
+class TensionMode(IntEnum):
+    """What happens in a zone that yields in tension.
+
+    DUCTILE: stays at the tensile strength; BRITTLE: the strength drops to zero; NONE: no
+    cut-off below the apex of the Mohr-Coulomb cone.
+    """
+
+    DUCTILE = 0
+    BRITTLE = 1
+    NONE = 2
+
+
+class Rock(NamedTuple):
+    """Elastic, Mohr-Coulomb rock.
+
+    Attributes
+    ----------
+    density [kg m-3], young_modulus [Pa], poisson_ratio [-], ucs [Pa], friction_angle [rad],
+    dilation_angle [rad], tensile_strength [Pa] : float
+    """
+
+    density: float
+    young_modulus: float
+    poisson_ratio: float
+    ucs: float
+    friction_angle: float
+    dilation_angle: float
+    tensile_strength: float
+
+
+class Hole(NamedTuple):
+    """Blasthole and how it is loaded.
+
+    Attributes
+    ----------
+    diameter : float [m]
+    charge_diameter : float [m]
+        Equal to `diameter` when fully coupled.
+    rise_time : float [s]
+        Linear ramp of the gas pressure.
+    in_situ_stress : float [Pa]
+        Isotropic compression before the blast, positive.
+    """
+
+    diameter: float
+    charge_diameter: float
+    rise_time: float
+    in_situ_stress: float
+
+
+class NearFieldSettings(NamedTuple):
+    """Settings of the near-field solver.
+
+    Attributes
+    ----------
+    mode : EndMode
+    tension : TensionMode
+    outer_radius : float [m]
+        0: 5.5 m in paper mode, as large as the end state needs in equilibrium mode.
+    zones : int
+        0: the default of the mode.
+    quadratic_viscosity, linear_viscosity : float [-]
+    history_points : int
+        Length of the pressure and radius histories.
+    """
+
+    mode: int = EndMode.EQUILIBRIUM
+    tension: int = TensionMode.DUCTILE
+    outer_radius: float = 0.0
+    zones: int = 0
+    quadratic_viscosity: float = 1.5
+    linear_viscosity: float = 0.3
+    history_points: int = 64

@@ -1,0 +1,1 @@
+"""Specs: YAML files and quantities with units, validated once at the edge."""

@@ -1,0 +1,1 @@
+"""Surrogates: training, scoring and tracking of regression models."""
