@@ -1,0 +1,58 @@
+"""`castblast dataset`: work on a written dataset."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from castblast.cli.screen import Screen
+from castblast.cli.verb import verb
+
+app = typer.Typer(help="Check and describe a written dataset.", no_args_is_help=True)
+
+_Dataset = Annotated[Path, typer.Argument(help="Dataset (netCDF).")]
+
+
+@verb(app)
+def check(screen: Screen, dataset: _Dataset) -> Mapping[str, Any]:
+    """Check a dataset against the format and report all faults (exit code 4 if there are any)."""
+    from castblast.stages.dataset import check_dataset
+
+    faults = check_dataset(dataset)
+    for fault in faults:
+        screen.say(f"{dataset}: {fault}")
+    if faults:
+        screen.exit_code = 4
+    else:
+        screen.say(f"{dataset}: no faults")
+    return {"dataset": str(dataset), "faults": faults}
+
+
+@verb(app)
+def describe(screen: Screen, dataset: _Dataset) -> Mapping[str, Any]:
+    """Say what a dataset holds: size, ranges, failures, versions."""
+    from castblast.stages.dataset import describe_dataset
+
+    description = describe_dataset(dataset)
+    for line in description.lines:
+        screen.say(line)
+    screen.table(description.header, description.rows)
+    return description.document
+
+
+@verb(app)
+def reproduce(
+    screen: Screen,
+    dataset: _Dataset,
+    sample: Annotated[int, typer.Option(min=0, help="Id of the sample.")] = 0,
+) -> Mapping[str, Any]:
+    """Recompute one sample from the file alone and compare it (exit code 4 if it differs)."""
+    from castblast.stages.dataset import reproduce_sample
+
+    outcome = reproduce_sample(dataset, sample)
+    screen.table(("quantity", "stored", "recomputed", "relative difference"), outcome.rows)
+    screen.say(outcome.verdict)
+    if not outcome.same:
+        screen.exit_code = 4
+    return outcome.document

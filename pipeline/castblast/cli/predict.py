@@ -1,0 +1,67 @@
+"""`castblast predict`: the instant answer of the chosen surrogate. Imports nothing heavy."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from castblast.cli.options import Settings
+from castblast.cli.screen import Screen
+from castblast.cli.verb import verb
+
+_Quantity = Annotated[str | None, typer.Option(metavar='"VALUE UNIT"', show_default=False)]
+
+
+def predict(
+    screen: Screen,
+    explosive: Annotated[str, typer.Option(help="Explosive the network knows.")] = "anfo",
+    burden: _Quantity = None,
+    bench_height: _Quantity = None,
+    hole_diameter: _Quantity = None,
+    charge_length: _Quantity = None,
+    stemming_length: _Quantity = None,
+    ucs: _Quantity = None,
+    young_modulus: _Quantity = None,
+    settings: Settings = None,
+    csv: Annotated[
+        Path | None,
+        typer.Option(help="Designs as CSV, one a row; heads like 'burden [m]'.", show_default=False),
+    ] = None,
+    network: Annotated[
+        Path | None, typer.Option(help="Another network.json.", show_default=False)
+    ] = None,
+) -> Mapping[str, Any]:
+    """Predict equilibrium pressure, hole expansion, crushed zone and burden velocity.
+
+    Inputs that are not given take their defaults. Every value comes with its 95 % band, and the
+    inputs that lie outside the training data are named.
+    """
+    from castblast.specs.case import split_assignments
+    from castblast.stages.predict import predict_csv, predict_design
+
+    if csv is not None:
+        table = predict_csv(csv, network)
+        if not screen.as_json:
+            screen.say(table.text.rstrip())
+        return {"rows": table.rows}
+    options = {
+        "burden": burden,
+        "bench_height": bench_height,
+        "hole_diameter": hole_diameter,
+        "charge_length": charge_length,
+        "stemming_length": stemming_length,
+        "ucs": ucs,
+        "young_modulus": young_modulus,
+    }
+    given = {name: value for name, value in options.items() if value is not None}
+    answer = predict_design({**given, **split_assignments(settings or [])}, explosive, network)
+    screen.table(("quantity", "value", "95 % band", "unit"), answer.rows, title=answer.title)
+    for line in answer.remarks:
+        screen.note(line)
+    return answer.document
+
+
+def add_to(app: typer.Typer) -> None:
+    """Register the verb."""
+    verb(app)(predict)

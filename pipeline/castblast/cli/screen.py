@@ -1,0 +1,121 @@
+"""What a verb may do with the terminal: lines, tables, a progress bar, or one JSON document.
+
+Rich is imported only when something is drawn, so that `--help` and `predict` start at once.
+"""
+
+import json
+import math
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from castblast.progress import ProgressCallback, silent
+
+
+@dataclass
+class Screen:
+    """Output of one run of the command line.
+
+    Attributes
+    ----------
+    as_json : bool
+        Print nothing but the result, as one JSON document on standard output.
+    quiet : bool
+        Print the result only, no progress.
+    debug : bool
+        Show tracebacks.
+    exit_code : int
+        What the process returns when the verb ends without an error.
+    """
+
+    as_json: bool = False
+    quiet: bool = False
+    debug: bool = False
+    exit_code: int = 0
+
+    def say(self, line: str = "") -> None:
+        """Print a line for people."""
+        if not self.as_json:
+            print(line)
+
+    def note(self, line: str) -> None:
+        """Print a remark on standard error unless quiet."""
+        if not self.quiet:
+            print(line, file=sys.stderr)
+
+    def table(self, header: Sequence[str], rows: Sequence[Sequence[str]], title: str = "") -> None:
+        """Print a table for people; the first column is left-aligned, the others right."""
+        if self.as_json:
+            return
+        from rich import box
+        from rich.console import Console
+        from rich.table import Table
+
+        table = Table(title=title or None, title_justify="left", box=box.SIMPLE_HEAD)
+        for index, name in enumerate(header):
+            table.add_column(name, justify="left" if index == 0 else "right")
+        for row in rows:
+            table.add_row(*row)
+        Console(width=None if sys.stdout.isatty() else 120).print(table)
+
+    def document(self, payload: Mapping[str, Any]) -> None:
+        """Print the result as JSON; NaN and infinity become null, as JSON has no such numbers."""
+        print(json.dumps(_plain(payload), indent=2, allow_nan=False))
+
+    @contextmanager
+    def progress(self, title: str) -> Iterator[ProgressCallback]:
+        """Give a callback that draws a bar, or plain lines where there is no terminal."""
+        if self.quiet or self.as_json:
+            yield silent
+        elif not sys.stderr.isatty():
+            yield _PlainLines(title)
+        else:
+            from rich.console import Console
+            from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+            columns = (
+                TextColumn("[bold]{task.description}"),
+                BarColumn(bar_width=28),
+                TextColumn("{task.percentage:>3.0f} %"),
+                TimeElapsedColumn(),
+                TextColumn("{task.fields[line]}"),
+            )
+            with Progress(*columns, console=Console(stderr=True)) as bar:
+                task = bar.add_task(title, total=1.0, line="")
+
+                def update(share: float, line: str) -> None:
+                    bar.update(task, completed=share, line=line)
+
+                yield update
+                bar.update(task, completed=1.0)
+
+
+class _PlainLines:
+    """Progress without a terminal: a line at every tenth, so that logs stay short."""
+
+    def __init__(self, title: str) -> None:
+        self.title = title
+        self.tenth = -1
+
+    def __call__(self, share: float, line: str) -> None:
+        tenth = math.floor(share * 10 + 1e-9)
+        if tenth > self.tenth:
+            self.tenth = tenth
+            print(f"{self.title}: {share:4.0%} {line}", file=sys.stderr, flush=True)
+
+
+def _plain(value: Any) -> Any:
+    """Turn arrays, NumPy scalars and paths into what JSON can hold."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, bool | int | str) or value is None:
+        return value
+    return str(value)

@@ -1,0 +1,55 @@
+"""How a function becomes a verb of the command line.
+
+Every verb takes a `Screen` first and returns its result as a mapping. The decorator adds the
+options that all verbs share, and prints the result as JSON when that is asked for.
+"""
+
+import inspect
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, TypeAlias, get_type_hints
+
+import typer
+
+from castblast.cli.screen import Screen
+
+Verb: TypeAlias = Callable[..., Mapping[str, Any] | None]
+
+_SHARED = {
+    "as_json": Annotated[
+        bool, typer.Option("--json", help="Print the result as one JSON document.")
+    ],
+    "quiet": Annotated[bool, typer.Option("--quiet", "-q", help="No progress, no remarks.")],
+    "debug": Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")],
+}
+
+
+def verb(app: typer.Typer, name: str | None = None) -> Callable[[Verb], Verb]:
+    """Register a function of (screen, ...) as a verb of `app`."""
+
+    def register(function: Verb) -> Verb:
+        def command(as_json: bool, quiet: bool, debug: bool, **options: Any) -> None:
+            screen = Screen(as_json, quiet, debug)
+            payload = function(screen, **options)
+            if screen.as_json and payload is not None:
+                screen.document(payload)
+            if screen.exit_code:
+                raise typer.Exit(screen.exit_code)
+
+        hints = get_type_hints(function, include_extras=True)
+        own = [
+            parameter.replace(annotation=hints[parameter.name], kind=inspect.Parameter.KEYWORD_ONLY)
+            for parameter in inspect.signature(function).parameters.values()
+            if parameter.name != "screen"
+        ]
+        shared = [
+            inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
+            for key, kind in _SHARED.items()
+        ]
+        command.__signature__ = inspect.Signature(own + shared)  # type: ignore[attr-defined]
+        command.__annotations__ = {p.name: p.annotation for p in own + shared}
+        command.__doc__ = function.__doc__
+        # A verb may be called `check` in two groups: its own name is the default.
+        app.command(name or function.__name__.replace("_", "-"))(command)
+        return function
+
+    return register

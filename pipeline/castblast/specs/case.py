@@ -1,0 +1,97 @@
+"""One blast to simulate: explosive, end mode and the values that differ from the defaults."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field
+
+from castblast.errors import SpecError, nearest_name
+from castblast.specs.loading import Spec, load_spec
+from castblast.specs.quantity import parse_variable
+from castblast.variables import INPUT_NAMES
+
+ModeName = Literal["equilibrium", "paper"]
+TensionName = Literal["ductile", "brittle", "none"]
+
+
+class CaseSpec(Spec):
+    """Contents of a case file.
+
+    Attributes
+    ----------
+    explosive : str
+        Name in the catalogue or path of an explosive file.
+    mode : {"equilibrium", "paper"}
+        End of the near-field run.
+    tension : {"ductile", "brittle", "none"}
+        Behaviour of rock that yields in tension.
+    parameter_set : {"authors", "field"}
+        Calibrated parameters of the burden model.
+    values : mapping of str to str
+        Input variables with their units; in the file under the key ``set``.
+    """
+
+    explosive: str = "anfo"
+    mode: ModeName = "equilibrium"
+    tension: TensionName = "ductile"
+    parameter_set: Literal["authors", "field"] = "authors"
+    values: dict[str, Any] = Field(default_factory=dict, alias="set")
+
+
+def read_case(path: Path | None) -> CaseSpec:
+    """Read a case file; without one, the defaults."""
+    return CaseSpec() if path is None else load_spec(path, CaseSpec)
+
+
+def split_assignments(assignments: Iterable[str]) -> dict[str, str]:
+    """Split ``NAME=VALUE UNIT`` texts of the command line.
+
+    Raises
+    ------
+    SpecError
+        A text without ``=`` or a name given twice.
+    """
+    values: dict[str, str] = {}
+    faults = []
+    for text in assignments:
+        name, sign, value = text.partition("=")
+        name = name.strip().replace("-", "_")
+        if not sign or not value.strip():
+            faults.append(f'--set {text}: write NAME="VALUE UNIT", e.g. --set burden="3 m"')
+        elif name in values:
+            faults.append(f"--set {name}: given twice")
+        else:
+            values[name] = value.strip()
+    if faults:
+        raise SpecError("\n".join(faults))
+    return values
+
+
+def parse_values(
+    values: Mapping[str, Any], where: str, names: Iterable[str] = INPUT_NAMES
+) -> dict[str, float]:
+    """Turn quantities with units into SI floats, reporting all faults at once.
+
+    Raises
+    ------
+    SpecError
+        One line per unknown name (with the nearest one), unit or value out of range.
+    """
+    allowed = tuple(names)
+    parsed: dict[str, float] = {}
+    faults = []
+    for name, value in values.items():
+        if name not in allowed:
+            hint = nearest_name(name, allowed)
+            faults.append(f"{where}: {name}: no such input{hint}")
+            continue
+        try:
+            parsed[name] = parse_variable(name, value, where)
+        except SpecError as error:
+            faults.append(str(error))
+    if faults:
+        raise SpecError("\n".join(faults))
+    return parsed

@@ -1,0 +1,157 @@
+"""Simulate one blast with the physics itself and say what came out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from castblast.blast import BlastCase, BlastResult, make_case, result_values, run_blast
+from castblast.errors import SimulationError, Status
+from castblast.nearfield.case import EndMode, NearFieldSettings, TensionMode
+from castblast.specs.case import parse_values
+from castblast.specs.explosive import load_explosive
+from castblast.stages.explosives import require_consistent
+from castblast.stages.files import write_csv, write_text
+from castblast.variables import VARIABLES
+
+#: Inputs that are settings of the near-field solver, not of the design.
+_SOLVER_NAMES = ("outer_radius", "zones", "quadratic_viscosity", "linear_viscosity")
+
+
+@dataclass(frozen=True)
+class SimulationOutcome:
+    """What `simulate` found: a document in SI units and the same for people."""
+
+    document: dict[str, Any]
+    title: str
+    rows: list[tuple[str, str, str]]
+    remarks: list[str] = field(default_factory=list)
+    files: list[Path] = field(default_factory=list)
+
+
+def simulate(
+    *,
+    explosive: str,
+    values: Mapping[str, Any],
+    mode: str = "equilibrium",
+    tension: str = "ductile",
+    parameter_set: str = "authors",
+    where: str = "--set",
+    allow_inconsistent: bool = False,
+    out: Path | None = None,
+) -> SimulationOutcome:
+    """Run near field and burden motion once.
+
+    Parameters
+    ----------
+    explosive : str
+        Name in the catalogue or path of an explosive file.
+    values : mapping of str to quantity
+        Inputs with units; the rest takes the defaults of `castblast.variables`.
+    mode, tension, parameter_set : str
+        See `castblast.specs.case.CaseSpec`.
+    out : path, optional
+        Folder for histories (CSV), the document (JSON) and pictures.
+
+    Raises
+    ------
+    SpecError
+        Unknown names, units, impossible designs.
+    CheckError
+        An inconsistent explosive, unless `allow_inconsistent`.
+    SimulationError
+        The run did not reach its end state.
+    """
+    given = parse_values(values, where)
+    spec = load_explosive(explosive)
+    remarks = require_consistent(spec, allow_inconsistent=allow_inconsistent)
+    case = make_case(
+        spec.to_explosive(),
+        {name: value for name, value in given.items() if name not in _SOLVER_NAMES},
+        near_field=_settings(given, mode, tension),
+        parameter_set=parameter_set,
+    )
+    result = run_blast(case)
+    document = _document(spec.name, mode, parameter_set, case, result)
+    status = Status(result.status)
+    if status is not Status.OK:
+        message = f"{spec.name}: the simulation failed ({status.name}): {status.meaning}"
+        raise SimulationError(message)
+    if not result.near_field.settled:
+        remarks.append("the hole wall was still moving at the end (settled: false)")
+    if given.get("charge_diameter", 0.0) not in (0.0, case.near_field.hole.diameter):
+        remarks.append("decoupled charge: the work of the gas on the air gap is neglected")
+    files = [] if out is None else _write(out, document, case, result)
+    title = f"{spec.name}, {mode} mode, {parameter_set} parameters"
+    return SimulationOutcome(document, title, _rows(document), remarks, files)
+
+
+def _settings(given: Mapping[str, float], mode: str, tension: str) -> NearFieldSettings:
+    defaults = NearFieldSettings()
+    return NearFieldSettings(
+        mode=EndMode[mode.upper()],
+        tension=TensionMode[tension.upper()],
+        outer_radius=given.get("outer_radius", defaults.outer_radius),
+        zones=round(given.get("zones", defaults.zones)),
+        quadratic_viscosity=given.get("quadratic_viscosity", defaults.quadratic_viscosity),
+        linear_viscosity=given.get("linear_viscosity", defaults.linear_viscosity),
+    )
+
+
+def _document(
+    name: str, mode: str, parameter_set: str, case: BlastCase, result: BlastResult
+) -> dict[str, Any]:
+    outputs: dict[str, Any] = dict(result_values(result))
+    outputs["settled"] = bool(result.near_field.settled)
+    return {
+        "explosive": name,
+        "mode": mode,
+        "parameter_set": parameter_set,
+        "status": Status(result.status).name.lower(),
+        **outputs,
+        "inputs": dict(case.inputs),
+    }
+
+
+def _rows(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    rows = []
+    for name, value in document.items():
+        variable = VARIABLES.get(name)
+        if variable is None or isinstance(value, bool):
+            continue
+        shown = value * variable.display_factor
+        rows.append((name.replace("_", " "), f"{shown:.6g}", variable.shown_unit))
+    return rows
+
+
+def _write(
+    out: Path, document: Mapping[str, Any], case: BlastCase, result: BlastResult
+) -> list[Path]:
+    import json
+
+    from castblast.report.simulation_figures import draw_simulation
+
+    near, burden = result.near_field, result.burden
+    files = [
+        write_text(out / "result.json", json.dumps(document, indent=2) + "\n"),
+        write_csv(
+            out / "near_field_history.csv",
+            {
+                "time [s]": near.history_time,
+                "pressure [Pa]": near.history_pressure,
+                "hole_radius [m]": near.history_radius,
+            },
+        ),
+        write_csv(
+            out / "burden_history.csv",
+            {
+                "time [s]": burden.history_time,
+                "pressure [Pa]": burden.history_pressure,
+                "velocity [m s-1]": burden.history_velocity,
+                "displacement [m]": burden.history_displacement,
+            },
+        ),
+    ]
+    return [*files, draw_simulation(out / "simulation.png", document, near, burden)]
