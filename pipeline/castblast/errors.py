@@ -71,5 +71,6 @@ class CheckError(CastblastError):
 
 def nearest_name(name: str, allowed: Iterable[str]) -> str:
     """Return ``", did you mean 'x'?"`` for the closest allowed name, or an empty string."""
-    close = get_close_matches(name.lower(), {a.lower(): a for a in allowed}, n=1, cutoff=0.6)
-    return f", did you mean '{close[0]}'?" if close else ""
+    spelled = {a.lower(): a for a in allowed}
+    close = get_close_matches(name.lower(), spelled, n=1, cutoff=0.6)
+    return f", did you mean '{spelled[close[0]]}'?" if close else ""
