@@ -13,7 +13,7 @@ from castblast.nearfield.case import EndMode, NearFieldSettings, TensionMode
 from castblast.specs.case import parse_values
 from castblast.specs.explosive import load_explosive
 from castblast.stages.explosives import require_consistent
-from castblast.stages.files import write_csv, write_text
+from castblast.files import write_csv, write_text
 from castblast.variables import VARIABLES
 
 #: Inputs that are settings of the near-field solver, not of the design.

@@ -1,0 +1,117 @@
+"""Pictures of one simulated blast: gas pressure, hole, burden motion and the energy ledger."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from castblast.report.style import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, new_figure, save_figure
+
+
+class NearFieldHistory(Protocol):
+    """The histories of a near-field run that are drawn."""
+
+    @property
+    def history_time(self) -> NDArray[np.float64]: ...  # noqa: D102
+    @property
+    def history_pressure(self) -> NDArray[np.float64]: ...  # noqa: D102
+    @property
+    def history_radius(self) -> NDArray[np.float64]: ...  # noqa: D102
+
+
+class BurdenHistory(Protocol):
+    """The histories of a burden-motion run that are drawn."""
+
+    @property
+    def history_time(self) -> NDArray[np.float64]: ...  # noqa: D102
+    @property
+    def history_pressure(self) -> NDArray[np.float64]: ...  # noqa: D102
+    @property
+    def history_velocity(self) -> NDArray[np.float64]: ...  # noqa: D102
+    @property
+    def history_displacement(self) -> NDArray[np.float64]: ...  # noqa: D102
+
+
+_LEDGER = (
+    ("plastic_work", "shear yield", BLUE),
+    ("tensile_work", "tensile yield", SKY),
+    ("elastic_energy", "elastic", GREEN),
+    ("kinetic_energy", "kinetic", ORANGE),
+    ("viscous_work", "viscosity", PURPLE),
+    ("boundary_work", "radiated", GREY),
+)
+
+
+def draw_simulation(
+    path: Path, document: Mapping[str, Any], near: NearFieldHistory, burden: BurdenHistory
+) -> Path:
+    """Draw the four panels of one blast.
+
+    Parameters
+    ----------
+    path : path
+        Picture to write (PNG or SVG).
+    document : mapping
+        Outputs of the run in SI units, by the names of `castblast.variables`.
+    near, burden
+        Objects with the history arrays, each of shape (n,).
+    """
+    figure, axes = new_figure(2, 2, width=9.0, height=5.8)
+    _draw_pressure(axes[0, 0], document, near)
+    _draw_hole(axes[0, 1], document, near)
+    _draw_burden(axes[1, 0], burden)
+    _draw_ledger(axes[1, 1], document)
+    figure.suptitle(
+        f"{document['explosive']}: equilibrium at {document['equilibrium_pressure'] * 1e-6:.0f} MPa, "
+        f"burden velocity {document['burden_velocity']:.1f} m/s",
+        fontsize=11,
+    )
+    return save_figure(figure, path)
+
+
+def _draw_pressure(axis: Any, document: Mapping[str, Any], near: NearFieldHistory) -> None:
+    axis.semilogy(near.history_time * 1e3, near.history_pressure * 1e-6, color=BLUE)
+    level = document["equilibrium_pressure"] * 1e-6
+    axis.axhline(level, color=GREY, linestyle=":", linewidth=1.0)
+    axis.annotate(f"equilibrium {level:.0f} MPa", (0.98, level), xycoords=("axes fraction", "data"),
+                  ha="right", va="bottom", fontsize=8, color=GREY)  # fmt: skip
+    axis.set(title="Gas pressure in the hole", xlabel="time [ms]", ylabel="pressure [MPa]")
+    positive = near.history_pressure[near.history_pressure > 0]
+    axis.set_ylim(bottom=0.5 * level, top=2 * float(positive.max()) * 1e-6)
+
+
+def _draw_hole(axis: Any, document: Mapping[str, Any], near: NearFieldHistory) -> None:
+    axis.plot(near.history_time * 1e3, near.history_radius * 1e3, color=RED)
+    axis.axhline(document["expanded_hole_radius"] * 1e3, color=GREY, linestyle=":", linewidth=1.0)
+    axis.set(title="Hole radius", xlabel="time [ms]", ylabel="radius [mm]")
+
+
+def _draw_burden(axis: Any, burden: BurdenHistory) -> None:
+    time = burden.history_time * 1e3
+    axis.plot(time, burden.history_velocity, color=BLUE, label="velocity")
+    axis.set(title="Burden motion", xlabel="time [ms]", ylabel="velocity [m/s]")
+    other = axis.twinx()
+    other.grid(visible=False)
+    other.spines["right"].set_visible(True)
+    other.semilogy(time, burden.history_pressure * 1e-6, color=ORANGE, label="gas pressure")
+    other.set_ylabel("pressure [MPa]")
+    lines = axis.get_lines() + other.get_lines()
+    axis.legend(lines, [line.get_label() for line in lines], loc="center right")
+
+
+def _draw_ledger(axis: Any, document: Mapping[str, Any]) -> None:
+    total = document["gas_work"]
+    shares = [(label, document[name] / total * 100.0, colour) for name, label, colour in _LEDGER]
+    shares.sort(key=lambda item: item[1])
+    bars = axis.barh([s[0] for s in shares], [s[1] for s in shares], color=[s[2] for s in shares])
+    axis.bar_label(bars, fmt="%.1f %%", padding=3, fontsize=8)
+    axis.set_xlim(right=max(s[1] for s in shares) * 1.2)
+    axis.grid(visible=False, axis="y")
+    axis.set(
+        title=f"Where the gas work goes ({total * 1e-6:.2f} MJ per metre of hole)",
+        xlabel="share of the gas work [%]",
+    )

@@ -1,0 +1,57 @@
+"""One look for all pictures, and the one way to save them.
+
+Figures are made without pyplot, so that nothing global changes and no display is needed.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+
+from castblast.files import write_with
+
+#: Colours that stay apart for colour-blind readers (Okabe & Ito 2008).
+BLUE, ORANGE, GREEN, RED, PURPLE, SKY, YELLOW, GREY = (
+    "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#F0E442", "#7F7F7F",
+)  # fmt: skip
+CYCLE = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY)
+
+_STYLE = {
+    "font.size": 9,
+    "axes.titlesize": 10,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#E5E5E5",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "legend.frameon": False,
+    "legend.fontsize": 8,
+    "lines.linewidth": 1.6,
+    "figure.facecolor": "white",
+}
+
+
+def new_figure(
+    rows: int = 1, columns: int = 1, *, width: float = 9.0, height: float = 3.2, **options: Any
+) -> tuple[Figure, Any]:
+    """Make a figure of `rows` x `columns` axes; `width` and `height` in inches.
+
+    Returns the figure and an array of axes (a single axes object for one).
+    """
+    with rc_context(_STYLE):
+        figure = Figure(figsize=(width, height), layout="constrained")
+        axes = figure.subplots(rows, columns, **options)
+    return figure, axes
+
+
+def save_figure(figure: Figure, path: Path, *, dpi: int = 150) -> Path:
+    """Write a PNG (or SVG, by suffix) whole or not at all, without a date in it."""
+    metadata = {"Date": None} if path.suffix == ".svg" else {"Software": None}
+    with rc_context(_STYLE):
+        return write_with(path, lambda name: figure.savefig(name, dpi=dpi, metadata=metadata))
