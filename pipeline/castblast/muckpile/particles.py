@@ -1,0 +1,100 @@
+"""Balls of the discrete-element model: arrays, masses, energies and a check of their state.
+
+The balls are rigid spheres of one density. Fragments with corners are not modelled; what corners
+do to a pile enters through the rolling resistance of the contact law.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray: TypeAlias = NDArray[np.float64]
+IntArray: TypeAlias = NDArray[np.int64]
+
+
+class Particles(NamedTuple):
+    """State of all balls.
+
+    Attributes
+    ----------
+    position : array (n, 3) [m]
+        Centres; x in the direction of throw, y along the bench, z up.
+    velocity : array (n, 3) [m s-1]
+    angular_velocity : array (n, 3) [rad s-1]
+    radius : array (n,) [m]
+    block : array (n,), int64
+        Block that fires the ball; -1: none, the ball is free from the start.
+    """
+
+    position: FloatArray
+    velocity: FloatArray
+    angular_velocity: FloatArray
+    radius: FloatArray
+    block: IntArray
+
+
+def particles_at_rest(
+    position: ArrayLike,
+    radius: ArrayLike,
+    block: ArrayLike | None = None,
+    velocity: ArrayLike | None = None,
+) -> Particles:
+    """Make `Particles` from centres (n, 3) [m] and radii (n,) [m], without spin; copies.
+
+    Parameters
+    ----------
+    position, radius : array_like
+    block : array_like (n,), optional
+        Default: -1, no block.
+    velocity : array_like (n, 3), optional [m s-1]
+        Default: at rest.
+    """
+    centre = np.array(position, dtype=np.float64, order="C").reshape(-1, 3)
+    count = len(centre)
+    speed = np.zeros((count, 3)) if velocity is None else np.array(velocity, dtype=np.float64)
+    group = np.full(count, -1) if block is None else np.array(block)
+    return Particles(
+        centre,
+        np.ascontiguousarray(speed.reshape(count, 3)),
+        np.zeros((count, 3)),
+        np.array(radius, dtype=np.float64, order="C").reshape(count),
+        group.astype(np.int64).reshape(count),
+    )
+
+
+def ball_mass(radius: FloatArray, density: float) -> FloatArray:
+    """Mass [kg] of each ball of shape (n,)."""
+    return (4.0 / 3.0) * np.pi * density * radius**3
+
+
+def ball_inertia(radius: FloatArray, density: float) -> FloatArray:
+    """Moment of inertia [kg m2] of each ball about its centre, shape (n,)."""
+    return 0.4 * ball_mass(radius, density) * radius**2
+
+
+def translational_energy(particles: Particles, density: float) -> float:
+    """Kinetic energy [J] of the motion of the centres."""
+    mass = ball_mass(particles.radius, density)
+    return float(0.5 * np.sum(mass * np.sum(particles.velocity**2, axis=1)))
+
+
+def rotational_energy(particles: Particles, density: float) -> float:
+    """Kinetic energy [J] of the spins."""
+    inertia = ball_inertia(particles.radius, density)
+    return float(0.5 * np.sum(inertia * np.sum(particles.angular_velocity**2, axis=1)))
+
+
+def potential_energy(particles: Particles, density: float, gravity: float = 9.81) -> float:
+    """Potential energy [J] over the level z = 0."""
+    return float(
+        np.sum(ball_mass(particles.radius, density) * particles.position[:, 2]) * gravity
+    )
+
+
+def centre_of_mass(particles: Particles) -> FloatArray:
+    """Centre of mass (3,) [m]; the balls have one density."""
+    weight = particles.radius**3
+    return np.asarray(weight @ particles.position / weight.sum())
