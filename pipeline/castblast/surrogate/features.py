@@ -1,0 +1,239 @@
+"""Rows of a dataset as a table that estimators take: features, targets and the frozen split.
+
+Only rows that finished (`status` 0) enter. The split comes from the dataset, so every model sees
+the same rows: train to fit, valid to choose between restarts and models, calibration for the
+error band only, test for the published scores only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from castblast.errors import DatasetError, nearest_name
+from castblast.network import Constraint, Floats, InputColumn, Transform
+from castblast.variables import VARIABLES
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+Split = Literal["train", "valid", "calibration", "test"]
+SPLITS: tuple[Split, ...] = ("train", "valid", "calibration", "test")
+
+#: Fewest rows per split: 39 is the least that gives a finite 95 % band with a row to spare.
+MINIMUM_ROWS: Mapping[Split, int] = {"train": 100, "valid": 20, "calibration": 39, "test": 20}
+_PROVENANCE = ("name", "dataset_version", "content_sha256", "recipe_sha256")
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Finished rows of a dataset.
+
+    Attributes
+    ----------
+    frame : pandas.DataFrame (n rows)
+        Numeric features [SI] and the column ``explosive`` (names).
+    targets : (n, m) [SI]
+    target_names : tuple of str
+    explosives : tuple of str
+        All names, sorted.
+    sample : (n,) int64
+        Stable ids of the rows.
+    split : (n,) of str
+        One of `SPLITS` for each row.
+    source : mapping
+        Name, version and hashes of the dataset.
+    """
+
+    frame: pd.DataFrame
+    targets: Floats
+    target_names: tuple[str, ...]
+    explosives: tuple[str, ...]
+    sample: NDArray[np.int64]
+    split: NDArray[np.str_]
+    source: Mapping[str, Any]
+
+    @property
+    def feature_names(self) -> tuple[str, ...]:
+        """Names of the numeric features."""
+        return tuple(name for name in self.frame.columns if name != "explosive")
+
+    def rows(self, *splits: Split) -> NDArray[np.int64]:
+        """Positions of the rows of the given splits, in order."""
+        return np.flatnonzero(np.isin(self.split, splits)).astype(np.int64)
+
+    def select(self, features: Sequence[str], targets: Sequence[str]) -> Table:
+        """Give the same rows with some of the features and targets, in the given order."""
+        positions = [self.target_names.index(name) for name in targets]
+        return replace(
+            self,
+            frame=self.frame[[*features, "explosive"]],
+            targets=self.targets[:, positions],
+            target_names=tuple(targets),
+        )
+
+    def with_train_rows(self, count: int, seed: int = 0) -> Table:
+        """Give the table with only `count` training rows; smaller choices lie in larger ones."""
+        train = np.random.default_rng(seed).permutation(self.rows("train"))
+        keep = np.ones(len(self.split), dtype=bool)
+        keep[train[count:]] = False
+        return replace(
+            self,
+            frame=self.frame[keep],
+            targets=self.targets[keep],
+            sample=self.sample[keep],
+            split=self.split[keep],
+        )
+
+
+def read_table(dataset: xr.Dataset, features: Sequence[str], targets: Sequence[str]) -> Table:
+    """Read what training needs from a dataset.
+
+    Raises
+    ------
+    DatasetError
+        Missing columns (with the nearest name), numbers that are not finite, too few rows of a
+        split, an explosive without training rows; all faults at once.
+    """
+    faults = [
+        f"{name}: the dataset has no such variable{nearest_name(name, map(str, dataset.data_vars))}"
+        for name in (*features, *targets, "explosive", "split", "status")
+        if name not in dataset.variables
+    ]
+    if faults:
+        raise DatasetError("\n".join(faults))
+    import pandas as pd
+
+    ok = np.flatnonzero(dataset["status"].to_numpy() == 0)
+    columns = {name: dataset[name].to_numpy()[ok].astype(np.float64) for name in features}
+    columns["explosive"] = _labels(dataset["explosive"])[ok]
+    table = Table(
+        frame=pd.DataFrame(columns),
+        targets=np.stack([dataset[name].to_numpy()[ok] for name in targets], axis=1).astype(float),
+        target_names=tuple(targets),
+        explosives=tuple(sorted({str(name) for name in columns["explosive"]})),
+        sample=dataset["sample"].to_numpy()[ok].astype(np.int64),
+        split=_labels(dataset["split"])[ok],
+        source={key: str(dataset.attrs[key]) for key in _PROVENANCE if key in dataset.attrs},
+    )
+    faults = _faults(table, dropped=dataset.sizes["sample"] - len(ok))
+    if faults:
+        raise DatasetError("\n".join(faults))
+    return table
+
+
+def _labels(variable: xr.DataArray) -> NDArray[np.str_]:
+    """Names per sample of a CF flag variable, or of one that holds names already."""
+    values = variable.to_numpy()
+    if not np.issubdtype(values.dtype, np.integer):
+        return values.astype(str)
+    meanings = str(variable.attrs.get("flag_meanings", "")).split()
+    flags = np.atleast_1d(variable.attrs.get("flag_values", np.arange(len(meanings))))
+    names = dict(zip(flags.tolist(), meanings, strict=False))
+    unknown = sorted(set(values.tolist()) - set(names))
+    if unknown:
+        message = f"{variable.name}: value {unknown[0]} has no entry in flag_meanings"
+        raise DatasetError(message)
+    return np.array([names[value] for value in values.tolist()], dtype=str)
+
+
+def _faults(table: Table, dropped: int) -> list[str]:
+    failed = f" ({dropped} failed samples left out)" if dropped else ""
+    faults = [
+        f"split '{split}': {len(table.rows(split))} finished rows{failed}, "
+        f"at least {least} are needed"
+        for split, least in MINIMUM_ROWS.items()
+        if len(table.rows(split)) < least
+    ]
+    numeric = {name: table.frame[name].to_numpy() for name in table.feature_names}
+    numeric |= dict(zip(table.target_names, table.targets.T, strict=True))
+    for name, values in numeric.items():
+        bad = np.flatnonzero(~np.isfinite(values))
+        if len(bad):
+            first = table.sample[bad[0]]
+            faults.append(f"{name}: not finite in {len(bad)} finished rows, first sample {first}")
+    train = table.frame["explosive"].to_numpy()[table.rows("train")]
+    faults += [
+        f"explosive '{name}': no training rows"
+        for name in table.explosives
+        if name not in set(train)
+    ]
+    return faults
+
+
+def check_positive(table: Table, names: Sequence[str]) -> None:
+    """Refuse columns that are to be logged but hold values of 0 or below.
+
+    Raises
+    ------
+    DatasetError
+        One line per column.
+    """
+    faults = []
+    for name in names:
+        values = (
+            table.targets[:, table.target_names.index(name)]
+            if name in table.target_names
+            else table.frame[name].to_numpy()
+        )
+        bad = np.flatnonzero(values <= 0.0)
+        if len(bad):
+            shown = VARIABLES[name].show(float(values[bad[0]]))
+            faults.append(
+                f"{name}: {len(bad)} rows are not above 0 (sample {table.sample[bad[0]]}: {shown}); "
+                "a model with transform 'log' cannot use it"
+            )
+    if faults:
+        raise DatasetError("\n".join(faults))
+
+
+def input_columns(
+    table: Table, transform: Transform, mean: Floats, scale: Floats
+) -> tuple[InputColumn, ...]:
+    """Describe the numeric features with their scaling and the range of the training rows."""
+    train = table.frame.iloc[table.rows("train")]
+    return tuple(
+        InputColumn(
+            name=name,
+            unit=VARIABLES[name].unit,
+            transform=transform,
+            mean=float(mean[j]),
+            scale=float(scale[j]),
+            lower=float(train[name].min()),
+            upper=float(train[name].max()),
+        )
+        for j, name in enumerate(table.feature_names)
+    )
+
+
+def domain_constraints(table: Table) -> tuple[Constraint, ...]:
+    """Rules of the domain that no box of single inputs can say, read off the training rows.
+
+    Charge length, bench height and burden are tied: what the charge leaves of the hole is its
+    stemming, and that was only trained between two multiples of the burden.
+    """
+    if not {"bench_height", "charge_length", "burden"} <= set(table.feature_names):
+        return ()
+    train = table.frame.iloc[table.rows("train")]
+    ratio = (train["bench_height"] - train["charge_length"]) / train["burden"]
+    # A hair outward, so that rounding of the linear form keeps every training row inside.
+    least, most = float(ratio.min()) - 1e-9, float(ratio.max()) + 1e-9
+    return (
+        Constraint(
+            f"bench height less charge length at least {least:.3g} burden",
+            {"bench_height": 1.0, "charge_length": -1.0, "burden": -least},
+            0.0,
+            "m",
+        ),
+        Constraint(
+            f"bench height less charge length at most {most:.3g} burden",
+            {"bench_height": -1.0, "charge_length": 1.0, "burden": most},
+            0.0,
+            "m",
+        ),
+    )
