@@ -36,7 +36,7 @@ class _Graph:
     def constant(self, name: str, values: NDArray[Any]) -> str:
         from onnx import numpy_helper
 
-        self.constants.append(numpy_helper.from_array(np.ascontiguousarray(values), name))
+        self.constants.append(numpy_helper.from_array(values.copy(order="C"), name))
         return name
 
     def add(self, operator: str, result: str, *operands: str, **attributes: Any) -> str:

@@ -110,7 +110,9 @@ def read_table(dataset: xr.Dataset, features: Sequence[str], targets: Sequence[s
     import pandas as pd
 
     ok = np.flatnonzero(dataset["status"].to_numpy() == 0)
-    columns = {name: dataset[name].to_numpy()[ok].astype(np.float64) for name in features}
+    columns: dict[str, NDArray[Any]] = {
+        name: dataset[name].to_numpy()[ok].astype(np.float64) for name in features
+    }
     columns["explosive"] = _labels(dataset["explosive"])[ok]
     table = Table(
         frame=pd.DataFrame(columns),
@@ -185,8 +187,8 @@ def check_positive(table: Table, names: Sequence[str]) -> None:
         if len(bad):
             shown = VARIABLES[name].show(float(values[bad[0]]))
             faults.append(
-                f"{name}: {len(bad)} rows are not above 0 (sample {table.sample[bad[0]]}: {shown}); "
-                "a model with transform 'log' cannot use it"
+                f"{name}: {len(bad)} rows are not above 0 (sample {table.sample[bad[0]]}: "
+                f"{shown}); a model with transform 'log' cannot use it"
             )
     if faults:
         raise DatasetError("\n".join(faults))

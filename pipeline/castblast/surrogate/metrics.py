@@ -41,9 +41,15 @@ class Score(NamedTuple):
     share_within: float
     rows: int
 
+    def to_document(self) -> dict[str, float | None]:
+        """Plain JSON values; None where a figure is not finite, as JSON has no such numbers."""
+        return {
+            key: value if math.isfinite(value) else None for key, value in self._asdict().items()
+        }
+
 
 def relative_errors(truth: Floats, predicted: Floats) -> Floats:
-    """(predicted - truth) / truth, signed; infinite where a truth of 0 is missed, 0 if it is hit."""
+    """(predicted - truth) / truth, signed; infinite where a truth of 0 is missed."""
     with np.errstate(divide="ignore", invalid="ignore"):
         errors: Floats = np.where(predicted == truth, 0.0, (predicted - truth) / np.abs(truth))
     return errors
@@ -59,7 +65,7 @@ def r_squared(truth: Floats, predicted: Floats) -> Floats:
 
 
 def error_quantile(truth: Floats, predicted: Floats) -> Floats:
-    """Absolute relative error not exceeded by at least `LEVEL` of the rows, along the first axis."""
+    """Absolute relative error that `LEVEL` of the rows do not exceed, along the first axis."""
     errors = np.abs(relative_errors(truth, predicted))
     return np.asarray(np.quantile(errors, LEVEL, axis=0, method="inverted_cdf"))
 
