@@ -246,9 +246,7 @@ def inside_table(isentrope: ProductIsentrope, relative_volume: float) -> bool:
     x = np.log(relative_volume)
     margin = np.log(TABLE_MARGIN)
     last = isentrope.log_volume.size - 1
-    return bool(
-        isentrope.log_volume[0] - margin <= x and x <= isentrope.log_volume[last] + margin
-    )
+    return bool(isentrope.log_volume[0] - margin <= x and x <= isentrope.log_volume[last] + margin)
 
 
 def in_hole_velocity(explosive: Explosive, hole_diameter: float) -> float:

@@ -30,7 +30,7 @@ class Spec(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
 
     def sha256(self) -> str:
-        """SHA-256 (hex) of the content in SI units, whatever the layout and comments of the file."""
+        """SHA-256 (hex) of the content in SI units, whatever the layout of the file."""
         content = json.dumps(
             self.model_dump(mode="json"), sort_keys=True, separators=(",", ":"), allow_nan=False
         )
@@ -69,8 +69,19 @@ def read_yaml(path: Path) -> dict[str, Any]:
         One line: the file is missing, a folder, unreadable, not UTF-8, empty, broken (with its
         line), has a key twice, or is not a mapping.
     """
+    return parse_yaml(read_text(path), str(path))
+
+
+def read_text(path: Path) -> str:
+    """Read a text file that a person named.
+
+    Raises
+    ------
+    SpecError
+        One line: the file is missing, a folder, unreadable or not UTF-8.
+    """
     try:
-        content = yaml.load(path.read_text(encoding="utf-8"), Loader=_Loader)
+        return path.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise SpecError(f"{path}: no such file{_nearest_file(path)}") from None
     except IsADirectoryError:
@@ -79,18 +90,30 @@ def read_yaml(path: Path) -> dict[str, Any]:
         raise SpecError(f"{path}: is not a text file in UTF-8") from None
     except OSError as fault:
         raise SpecError(f"{path}: cannot be read: {fault.strerror}") from None
+
+
+def parse_yaml(text: str, where: str) -> dict[str, Any]:
+    """Read a mapping from YAML text; `where` names its origin in messages.
+
+    Raises
+    ------
+    SpecError
+        One line: empty, broken (with its line), has a key twice, or is not a mapping.
+    """
+    try:
+        content = yaml.load(text, Loader=_Loader)
     except yaml.YAMLError as fault:
-        raise SpecError(_broken(path, fault)) from None
+        raise SpecError(_broken(where, fault)) from None
     except RecursionError:
-        raise SpecError(f"{path}: nested too deeply") from None
+        raise SpecError(f"{where}: nested too deeply") from None
     if content is None:
-        raise SpecError(f"{path}: is empty")
+        raise SpecError(f"{where}: is empty")
     if not isinstance(content, dict):
         kind = "a list" if isinstance(content, list) else "a single value"
-        raise SpecError(f"{path}: holds {kind}; lines of the form 'key: value' are needed")
+        raise SpecError(f"{where}: holds {kind}; lines of the form 'key: value' are needed")
     odd = [key for key in content if not isinstance(key, str)]
     if odd:
-        raise SpecError(f"{path}: the key {odd[0]!r} is not a name")
+        raise SpecError(f"{where}: the key {odd[0]!r} is not a name")
     return content
 
 
@@ -130,11 +153,11 @@ def _nearest_file(path: Path) -> str:
     return nearest_name(path.name, names)
 
 
-def _broken(path: Path, fault: yaml.YAMLError) -> str:
+def _broken(where: str, fault: yaml.YAMLError) -> str:
     mark = getattr(fault, "problem_mark", None) or getattr(fault, "context_mark", None)
     problem = getattr(fault, "problem", None) or getattr(fault, "reason", None) or "not YAML"
     place = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
-    return f"{path}: {place}{problem}"
+    return f"{where}: {place}{problem}"
 
 
 def _fault_lines(fault: ValidationError, model: type[BaseModel]) -> list[str]:
@@ -193,8 +216,8 @@ def _names_at(model: Any, place: tuple[int | str, ...]) -> set[str]:
     """Field names of every model that the annotation at `place` allows."""
     found = _models(model)
     for part in place:
-        if isinstance(part, int):
-            continue
+        if isinstance(part, int) or not any(part in outer.model_fields for outer in found):
+            continue  # an entry of a list, or the key of a mapping of models
         found = [
             inner
             for outer in found
