@@ -1,0 +1,164 @@
+"""What a build asks of the physics: complete a design, refuse it, simulate a batch of rows.
+
+`Simulator` is the whole interface, over columns of equal length, so that a build knows nothing of
+blasting and a solver that advances many rows in lockstep fits in the same place. `BlastSimulator`
+is the real one: it runs `castblast.blast` row by row.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from castblast.blast import (
+    BlastSettings,
+    design_faults,
+    make_case,
+    resolve_inputs,
+    result_values,
+    run_blast,
+)
+from castblast.errors import Status
+from castblast.explosive.isentrope import Explosive
+from castblast.nearfield.case import EndMode, TensionMode
+from castblast.specs.recipe import Recipe
+from castblast.variables import OUTPUT_NAMES
+
+FloatArray: TypeAlias = NDArray[np.float64]
+IntArray: TypeAlias = NDArray[np.integer]
+#: Names of variables to values (n,), SI.
+Columns: TypeAlias = Mapping[str, FloatArray]
+
+#: Histories of a sample, all of shape (n, history_points).
+HISTORY_NAMES = ("history_time", "history_pressure", "history_radius")
+_NUMBER = re.compile(r"[-+]?\d[\d.]*(?:e[-+]?\d+)?")
+
+
+class BatchResult(NamedTuple):
+    """Outcome of n rows.
+
+    Attributes
+    ----------
+    status : (n,) int8
+        `castblast.errors.Status` of each row.
+    outputs : dict of (n,) [SI]
+        NaN where the status is not OK.
+    histories : dict of (n, history_points) [SI]
+        The names of `HISTORY_NAMES`; NaN where the status is not OK.
+    """
+
+    status: NDArray[np.int8]
+    outputs: dict[str, FloatArray]
+    histories: dict[str, FloatArray]
+
+
+class Simulator(Protocol):
+    """The physics as a build sees it; must pickle, for workers in other processes."""
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """Names of the outputs of every row."""
+        ...
+
+    def faults(self, columns: Columns) -> list[str]:
+        """Say for every row what makes it impossible; an empty string where nothing does."""
+        ...
+
+    def resolve(self, columns: Columns, explosive: IntArray) -> dict[str, FloatArray]:
+        """Complete the inputs: every input by name, (n,), SI."""
+        ...
+
+    def run(self, inputs: Columns, explosive: IntArray) -> BatchResult:
+        """Simulate resolved rows; physics never raises, it sets a status."""
+        ...
+
+
+@dataclass(frozen=True)
+class BlastSimulator:
+    """Near field and burden motion of `castblast.blast`, row by row.
+
+    Attributes
+    ----------
+    explosives : tuple of Explosive
+        In the order of the recipe.
+    settings : BlastSettings
+    solver_inputs : mapping
+        Solver inputs that are the same in every row.
+    """
+
+    explosives: tuple[Explosive, ...]
+    settings: BlastSettings
+    solver_inputs: Mapping[str, float]
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """Every output of `castblast.variables`."""
+        return OUTPUT_NAMES
+
+    def faults(self, columns: Columns) -> list[str]:
+        """First fault of every row by `blast.design_faults`."""
+        return ["; ".join(design_faults(row)[:1]) for row in _rows(columns)]
+
+    def resolve(self, columns: Columns, explosive: IntArray) -> dict[str, FloatArray]:
+        """Every input of every row by `blast.resolve_inputs`."""
+        resolved = [
+            resolve_inputs(
+                {**row, **self.solver_inputs},
+                self.explosives[index],
+                self.settings.parameter_set,
+            )
+            for row, index in zip(_rows(columns), explosive, strict=True)
+        ]
+        return {name: np.array([row[name] for row in resolved]) for name in resolved[0]}
+
+    def run(self, inputs: Columns, explosive: IntArray) -> BatchResult:
+        """Simulate resolved rows one after the other."""
+        count = len(explosive)
+        status = np.empty(count, dtype=np.int8)
+        outputs = {name: np.full(count, np.nan) for name in OUTPUT_NAMES}
+        histories = {
+            name: np.full((count, self.settings.history_points), np.nan) for name in HISTORY_NAMES
+        }
+        for i, (row, index) in enumerate(zip(_rows(inputs), explosive, strict=True)):
+            result = run_blast(make_case(self.explosives[index], row, self.settings))
+            status[i] = result.status
+            for name, value in result_values(result).items():
+                outputs[name][i] = value
+            if result.status == Status.OK:
+                for name in HISTORY_NAMES:
+                    histories[name][i] = getattr(result.near_field, name)
+        return BatchResult(status, outputs, histories)
+
+
+def blast_simulator(recipe: Recipe, explosives: tuple[Explosive, ...]) -> BlastSimulator:
+    """Set up the physics for a recipe; `explosives` in the order of the recipe."""
+    solver = recipe.solver
+    settings = BlastSettings(
+        mode=EndMode[solver.mode.upper()],
+        tension=TensionMode[solver.tension.upper()],
+        history_points=solver.history_points,
+        parameter_set=recipe.burden_parameter_set,
+    )
+    inputs = {
+        "quadratic_viscosity": solver.quadratic_viscosity,
+        "linear_viscosity": solver.linear_viscosity,
+        "outer_radius": solver.outer_radius or 0.0,
+        "zones": float(solver.zones),
+    }
+    return BlastSimulator(explosives, settings, inputs)
+
+
+def fault_kind(fault: str) -> str:
+    """Reduce a fault to its kind by dropping the numbers of its row."""
+    return _NUMBER.sub("#", fault)
+
+
+def _rows(columns: Columns) -> list[dict[str, float]]:
+    names = list(columns)
+    table = zip(*(columns[name].tolist() for name in names), strict=True)
+    return [dict(zip(names, row, strict=True)) for row in table]
