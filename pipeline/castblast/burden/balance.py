@@ -1,0 +1,220 @@
+"""Balance of mass, momentum and energy of one hole: the right-hand side of the burden motion.
+
+The gas that stays in the hole remains on the isentrope through the CJ point, because gas that
+leaves takes its own entropy with it; its state is P_s(V_g rho0 / m). The gas volume is
+
+    V_g = V_h [1 + zeta (1 - exp(-t / tau))] + V_b(x) + A_h s
+
+expanded hole, radial cracks that fill in the time tau = B_m / (2 v_crack), space behind the
+burden, and stem of the hole behind the moving stemming. The force on the burden is
+(P - P_a) dV_b/dx, so that work and volume agree to round-off. After Furtney, Sellers & Onederra
+(2012), who balance expansion work against venting through fractures and stemming; the closed form
+is derived by this project. Left out: crack growth between the near field and the motion, cooling
+of the gas by rock, and neighbouring holes.
+"""
+
+from __future__ import annotations
+
+from math import pi
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from castblast.burden.case import BurdenGeometry, BurdenParameters
+from castblast.burden.geometry import (
+    breakout_width,
+    burden_mass,
+    explosive_mass,
+    mean_burden,
+    pressurised_section,
+    pressurised_width,
+    rock_volume,
+)
+from castblast.burden.stemming import leakage_flux, stemming_acceleration
+from castblast.burden.venting import ATMOSPHERIC_PRESSURE, fracture_flux, nozzle_flux
+from castblast.explosive.isentrope import (
+    Explosive,
+    FloatArray,
+    ProductIsentrope,
+    energy,
+    pressure,
+    slope,
+)
+from castblast.kernel import kernel
+
+GRAVITY: Final = 9.80665
+
+# Order of the state vector; integrals of the ledger ride along.
+GAS_MASS: Final = 0
+DISPLACEMENT: Final = 1
+VELOCITY: Final = 2
+PLUG_DISPLACEMENT: Final = 3
+PLUG_VELOCITY: Final = 4
+FRACTURE_MASS: Final = 5
+COLLAR_MASS: Final = 6
+BURDEN_WORK: Final = 7
+FRACTURE_WORK: Final = 8
+PLUG_WORK: Final = 9
+VENTED_ENTHALPY: Final = 10
+STATE_SIZE: Final = 11
+
+
+class Balance(NamedTuple):
+    """Constants of one case, SI units; made by `make_balance`."""
+
+    isentrope: ProductIsentrope
+    explosive_density: float
+    gas_mass: float
+    hole_volume: float
+    storage_volume: float
+    storage_time: float
+    venting_time: float
+    rock_volume: float
+    burden_mass: float
+    friction_force: float
+    charge_length: float
+    path: float
+    hole_width: float
+    full_width: float
+    growth_distance: float
+    hole_area: float
+    stemming_length: float
+    wall_rate: float
+    stemming_density: float
+    porosity: float
+    grain_size: float
+    collar_discharge: float
+    opening_ratio: float
+    initial_aperture: float
+    fracture_count: float
+    friction_factor: float
+    viscosity: float
+
+
+@kernel
+def make_balance(
+    explosive: Explosive,
+    geometry: BurdenGeometry,
+    parameters: BurdenParameters,
+    expanded_hole_radius: float,
+) -> Balance:
+    """Work out the constants of a case; the hole radius in m is the end state of the near field."""
+    mean = mean_burden(geometry)
+    mass = burden_mass(geometry)
+    hole_volume = pi * expanded_hole_radius**2 * geometry.charge_length
+    return Balance(
+        explosive.isentrope,
+        explosive.density,
+        explosive_mass(geometry, explosive.density),
+        hole_volume,
+        parameters.fracture_storage_ratio * hole_volume,
+        mean / (2.0 * parameters.crack_velocity),
+        mean / parameters.gas_front_velocity,
+        rock_volume(geometry),
+        mass,
+        parameters.floor_friction * mass * GRAVITY,
+        geometry.charge_length,
+        mean,
+        2.0 * expanded_hole_radius,
+        breakout_width(geometry),
+        parameters.pressurised_width_ratio * mean,
+        pi / 4.0 * geometry.hole_diameter**2,
+        geometry.stemming_length,
+        4.0 * parameters.stemming_wall_friction / geometry.hole_diameter,
+        parameters.stemming_density,
+        parameters.stemming_porosity,
+        parameters.stemming_grain_ratio * geometry.hole_diameter,
+        parameters.collar_discharge_coefficient,
+        parameters.fracture_opening_ratio,
+        parameters.initial_aperture,
+        parameters.fracture_count,
+        parameters.fracture_friction_factor,
+        parameters.gas_viscosity,
+    )
+
+
+@kernel
+def relative_volume(b: Balance, time: float, state: FloatArray) -> float:
+    """Gas volume over the volume that its mass had as explosive [-]."""
+    section = pressurised_section(
+        state[DISPLACEMENT], b.hole_width, b.full_width, b.growth_distance
+    )
+    volume = (
+        b.hole_volume
+        - b.storage_volume * np.expm1(-time / b.storage_time)
+        + b.charge_length * section
+        + b.hole_area * state[PLUG_DISPLACEMENT]
+    )
+    return float(volume * b.explosive_density / state[GAS_MASS])
+
+
+@kernel
+def loaded_area(b: Balance, displacement: float) -> float:
+    """Area on which the gas pushes the burden [m2], at a displacement in m."""
+    width = pressurised_width(displacement, b.hole_width, b.full_width, b.growth_distance)
+    return b.charge_length * width
+
+
+@kernel
+def rates(
+    b: Balance, venting: bool, plugged: bool, time: float, state: FloatArray, rate: FloatArray
+) -> float:
+    """Time derivative of the state.
+
+    Parameters
+    ----------
+    b : Balance
+    venting : bool
+        The gas front has reached the face.
+    plugged : bool
+        The stemming is in the hole; afterwards the collar is open and the stem volume constant.
+    time : float [s]
+    state : array (11,)
+        SI units, in the order of the constants above.
+    rate : array (11,)
+        Result.
+
+    Returns
+    -------
+    float
+        Gas pressure [Pa].
+    """
+    volume = relative_volume(b, time, state)
+    p = pressure(b.isentrope, volume)
+    density = b.explosive_density / volume
+    k = slope(b.isentrope, volume)
+    area = loaded_area(b, state[DISPLACEMENT])
+    storing = b.storage_volume / b.storage_time * np.exp(-time / b.storage_time)
+
+    through_fractures = 0.0
+    if venting:
+        opening = b.initial_aperture + b.opening_ratio * state[DISPLACEMENT]
+        flux = fracture_flux(
+            p, density, k, opening / b.fracture_count, b.path, b.friction_factor, b.viscosity
+        )
+        through_fractures = opening * b.charge_length * flux
+    if plugged:
+        moved = state[PLUG_DISPLACEMENT]
+        push = stemming_acceleration(p, moved, b.stemming_length, b.wall_rate, b.stemming_density)
+        inside = b.stemming_length - moved
+        collar_flux = leakage_flux(p, density, k, inside, b.porosity, b.grain_size)
+        plug_velocity = state[PLUG_VELOCITY]
+    else:
+        push = 0.0
+        collar_flux = b.collar_discharge * nozzle_flux(p, density, k)
+        plug_velocity = 0.0
+    through_collar = b.hole_area * collar_flux
+    enthalpy = (energy(b.isentrope, volume) + p * volume) / b.explosive_density
+
+    rate[GAS_MASS] = -(through_fractures + through_collar)
+    rate[DISPLACEMENT] = state[VELOCITY]
+    rate[VELOCITY] = ((p - ATMOSPHERIC_PRESSURE) * area - b.friction_force) / b.burden_mass
+    rate[PLUG_DISPLACEMENT] = plug_velocity
+    rate[PLUG_VELOCITY] = push
+    rate[FRACTURE_MASS] = through_fractures
+    rate[COLLAR_MASS] = through_collar
+    rate[BURDEN_WORK] = p * area * state[VELOCITY]
+    rate[FRACTURE_WORK] = p * storing
+    rate[PLUG_WORK] = p * b.hole_area * plug_velocity
+    rate[VENTED_ENTHALPY] = enthalpy * (through_fractures + through_collar)
+    return p
