@@ -19,12 +19,12 @@ from __future__ import annotations
 
 from enum import IntEnum
 from math import pi, sqrt
-from typing import NamedTuple
-
-import numpy as np
+from typing import NamedTuple, TypeAlias
 
 from castblast.kernel import kernel
 from castblast.muckpile.particles import FloatArray
+
+Vector: TypeAlias = tuple[float, float, float]
 
 #: Words of one row of contact memory.
 ROW = 8
@@ -162,25 +162,30 @@ def wall_stiffness(radius: float, modulus: float) -> float:
 
 @kernel
 def contact_force(
-    row: FloatArray,
+    memory: FloatArray,
+    dash: FloatArray,
+    p: int,
     law: Constants,
     friction: float,
     rolling_friction: float,
-    normal: tuple[float, float, float],
+    normal: Vector,
     overlap: float,
     effective_radius: float,
-    slide: tuple[float, float, float],
-    roll: tuple[float, float, float],
+    slide: Vector,
+    roll: Vector,
     spin: float,
     step: float,
     work: FloatArray,
-) -> tuple[float, float, float]:
-    """Advance one contact by a step: update its memory `row`, return the force on the second.
+    w: int,
+) -> tuple[Vector, Vector]:
+    """Advance contact `p` by a step: update its memory, return what it does to the second partner.
 
     Parameters
     ----------
-    row : array (8,)
-        Memory of the contact; F_s and M are updated in place.
+    memory : array (p, 8)
+        Rows of contact memory; F_s and M are updated in place.
+    dash : array (p, 3) or (0, 3) [N]
+        Dashpot force of the last step, for the ledger only; empty: no ledger is kept.
     law : Constants
     friction, rolling_friction : float [-]
         Of this contact (walls may have their own).
@@ -197,13 +202,13 @@ def contact_force(
     spin : float [rad s-1]
         Mean spin of both about the normal: turns the contact plane with its partners.
     step : float [s]
-    work : array (3,) [J]
-        Work of slip, rolling slip and dashpots; what this step dissipates is added.
+    work : array (k, 3) [J]
+        Row `w` collects the work of slip, rolling slip and dashpots.
 
     Returns
     -------
-    3 floats [N]
-        Force on the second partner. The moment on it is left in ``row[3:6]``.
+    3 floats [N], 3 floats [N m]
+        Force and rolling moment on the second partner.
 
     Notes
     -----
@@ -212,70 +217,112 @@ def contact_force(
     the same with the bending part of the relative rotation.
     """
     nx, ny, nz = normal
-    kn = row[6]
+    kn = memory[p, 6]
     ks = kn * law.shear_ratio
     fn = kn * overlap
     vn = slide[0] * nx + slide[1] * ny + slide[2] * nz
     vx, vy, vz = slide[0] - vn * nx, slide[1] - vn * ny, slide[2] - vn * nz
 
-    # Shear spring: follow the plane, grow, slip.
-    fx, fy, fz = _follow(row[0], row[1], row[2], nx, ny, nz, spin * step)
-    grow = ks * step
-    fx -= grow * vx
-    fy -= grow * vy
-    fz -= grow * vz
-    limit = friction * fn
-    square = fx * fx + fy * fy + fz * fz
-    slips = square > limit * limit
-    if slips:
-        length = sqrt(square)
-        cut = limit / length
-        # Slip is what the spring did not take up; the friction force is the mean over the step.
-        work[0] += limit * (length - limit) / ks
-        fx *= cut
-        fy *= cut
-        fz *= cut
-    row[0], row[1], row[2] = fx, fy, fz
+    force = _follow(memory[p, 0], memory[p, 1], memory[p, 2], normal, spin * step)
+    force, slip_work, slips = _grow(force, (vx, vy, vz), ks, step, friction * fn)
+    fx, fy, fz = force
+    memory[p, 0], memory[p, 1], memory[p, 2] = fx, fy, fz
 
-    # Rolling spring.
     wn = roll[0] * nx + roll[1] * ny + roll[2] * nz
-    kr = ks * effective_radius * effective_radius
-    grow = kr * step
-    mx, my, mz = _follow(row[3], row[4], row[5], nx, ny, nz, spin * step)
-    mx -= grow * (roll[0] - wn * nx)
-    my -= grow * (roll[1] - wn * ny)
-    mz -= grow * (roll[2] - wn * nz)
-    limit = rolling_friction * effective_radius * fn
-    square = mx * mx + my * my + mz * mz
-    if square > limit * limit:
-        length = sqrt(square)
-        cut = limit / length
-        work[1] += limit * (length - limit) / kr
-        mx *= cut
-        my *= cut
-        mz *= cut
-    row[3], row[4], row[5] = mx, my, mz
+    bend = (roll[0] - wn * nx, roll[1] - wn * ny, roll[2] - wn * nz)
+    moment = _follow(memory[p, 3], memory[p, 4], memory[p, 5], normal, spin * step)
+    moment, roll_work, _ = _grow(
+        moment,
+        bend,
+        ks * effective_radius * effective_radius,
+        step,
+        rolling_friction * effective_radius * fn,
+    )
+    memory[p, 3], memory[p, 4], memory[p, 5] = moment
 
-    # Dashpots. vn < 0 while the partners approach.
-    dash = -law.damping_normal * row[7] * vn
-    if law.no_tension and fn + dash < 0.0:
-        dash = -fn
-    work[2] -= dash * vn * step
-    if not (slips and law.slip_cut):
-        drag = law.damping_shear * row[7]
-        fx -= drag * vx
-        fy -= drag * vy
-        fz -= drag * vz
-        work[2] += drag * (vx * vx + vy * vy + vz * vz) * step
-    fn += dash
-    return fn * nx + fx, fn * ny + fy, fn * nz + fz
+    # vn < 0 while the partners approach.
+    push = -law.damping_normal * memory[p, 7] * vn
+    if law.no_tension and fn + push < 0.0:
+        push = -fn
+    drag = law.damping_shear * memory[p, 7]
+    if law.slip_cut and slips:
+        drag = 0.0
+    dx, dy, dz = push * nx - drag * vx, push * ny - drag * vy, push * nz - drag * vz
+    if len(dash) > 0:
+        # Half of the work of the force before and half of the force now, over the same path: the
+        # form in which kick-drift-kick integration exchanges energy.
+        work[w, 0] += slip_work
+        work[w, 1] += roll_work
+        work[w, 2] -= (
+            0.5
+            * step
+            * (
+                (dash[p, 0] + dx) * slide[0]
+                + (dash[p, 1] + dy) * slide[1]
+                + (dash[p, 2] + dz) * slide[2]
+            )
+        )
+        dash[p, 0], dash[p, 1], dash[p, 2] = dx, dy, dz
+    return (fn * nx + fx + dx, fn * ny + fy + dy, fn * nz + fz + dz), moment
 
 
 @kernel
-def _follow(
-    x: float, y: float, z: float, nx: float, ny: float, nz: float, angle: float
-) -> tuple[float, float, float]:
-    """Carry a tangential vector into the plane of normal n and turn it by a small `angle`."""
+def forget_contact(
+    memory: FloatArray,
+    dash: FloatArray,
+    p: int,
+    shear_ratio: float,
+    effective_radius: float,
+    slide: Vector,
+    step: float,
+    work: FloatArray,
+    w: int,
+) -> None:
+    """Clear the memory of a contact that has just opened.
+
+    The springs hold almost nothing then, because their limits fell to zero with the normal force;
+    what the last step left in them counts as slip. Arguments as in `contact_force`.
+    """
+    if len(dash) > 0:
+        ks = memory[p, 6] * shear_ratio
+        work[w, 0] += (memory[p, 0] ** 2 + memory[p, 1] ** 2 + memory[p, 2] ** 2) / (2.0 * ks)
+        work[w, 1] += (memory[p, 3] ** 2 + memory[p, 4] ** 2 + memory[p, 5] ** 2) / (
+            2.0 * ks * effective_radius * effective_radius
+        )
+        work[w, 2] -= (
+            0.5 * step * (dash[p, 0] * slide[0] + dash[p, 1] * slide[1] + dash[p, 2] * slide[2])
+        )
+        dash[p, 0], dash[p, 1], dash[p, 2] = 0.0, 0.0, 0.0
+    for word in range(6):
+        memory[p, word] = 0.0
+
+
+@kernel
+def _grow(
+    force: Vector, rate: Vector, stiffness: float, step: float, limit: float
+) -> tuple[Vector, float, bool]:
+    """Let a spring force grow by -stiffness rate dt up to `limit`.
+
+    Returns the force, the slip work [J] and whether it slips. The slip work is the mean of the force before and after, times the path that the spring did
+    not take up.
+    """
+    x = force[0] - stiffness * step * rate[0]
+    y = force[1] - stiffness * step * rate[1]
+    z = force[2] - stiffness * step * rate[2]
+    square = x * x + y * y + z * z
+    if square <= limit * limit:
+        return (x, y, z), 0.0, False
+    length = sqrt(square)
+    cut = limit / length
+    before = (force[0] * x + force[1] * y + force[2] * z) / length
+    slip_work = 0.5 * (before + limit) * (length - limit) / stiffness
+    return (x * cut, y * cut, z * cut), slip_work, True
+
+
+@kernel
+def _follow(x: float, y: float, z: float, normal: Vector, angle: float) -> Vector:
+    """Carry a tangential vector into the plane of `normal` and turn it by a small `angle`."""
+    nx, ny, nz = normal
     square = x * x + y * y + z * z
     if square == 0.0:
         return 0.0, 0.0, 0.0
@@ -294,16 +341,18 @@ def _follow(
 
 
 @kernel
-def spring_energy(row: FloatArray, overlap: float, radius: float, shear_ratio: float) -> float:
-    """Elastic energy [J] of a contact of effective radius `radius`."""
-    kn = row[6]
-    ks = kn * shear_ratio
-    shear = row[0] * row[0] + row[1] * row[1] + row[2] * row[2]
-    moment = row[3] * row[3] + row[4] * row[4] + row[5] * row[5]
-    return 0.5 * (kn * overlap * overlap + (shear + moment / (radius * radius)) / ks)
+def spring_energy(
+    memory: FloatArray, p: int, overlap: float, effective_radius: float, shear_ratio: float
+) -> float:
+    """Elastic energy [J] of contact `p`: normal, shear and rolling spring."""
+    kn = memory[p, 6]
+    shear = memory[p, 0] ** 2 + memory[p, 1] ** 2 + memory[p, 2] ** 2
+    moment = memory[p, 3] ** 2 + memory[p, 4] ** 2 + memory[p, 5] ** 2
+    bent = shear + moment / (effective_radius * effective_radius)
+    return 0.5 * (kn * overlap * overlap + bent / (kn * shear_ratio))
 
 
-def default_step_factor(law: ContactLaw) -> float:
+def damped_step_factor(law: ContactLaw) -> float:
     """Factor by which damping shortens the stable step: sqrt(1 + b^2) - b (PFC manual)."""
     beta = max(law.damping_normal, law.damping_shear)
-    return float(np.sqrt(1.0 + beta * beta) - beta)
+    return sqrt(1.0 + beta * beta) - beta

@@ -89,9 +89,7 @@ def rotational_energy(particles: Particles, density: float) -> float:
 
 def potential_energy(particles: Particles, density: float, gravity: float = 9.81) -> float:
     """Potential energy [J] over the level z = 0."""
-    return float(
-        np.sum(ball_mass(particles.radius, density) * particles.position[:, 2]) * gravity
-    )
+    return float(np.sum(ball_mass(particles.radius, density) * particles.position[:, 2]) * gravity)
 
 
 def centre_of_mass(particles: Particles) -> FloatArray:
