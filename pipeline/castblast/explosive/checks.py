@@ -120,11 +120,11 @@ def _jwl_energy(jwl: JwlSet, complete: CompleteJwl) -> list[Finding]:
     state, velocity = own
     findings.append(
         judge_deviation("velocity of the own CJ state against D",
-                   velocity / jwl.detonation_velocity - 1.0, 0.01, 0.05)
+                   velocity / jwl.detonation_velocity - 1.0, 0.01, 0.02)
     )  # fmt: skip
     findings.append(
         judge_deviation("pressure of the own CJ state against P_CJ",
-                   state.pressure / complete.cj.pressure - 1.0, 0.02, 0.10)
+                   state.pressure / complete.cj.pressure - 1.0, 0.02, 0.05)
     )  # fmt: skip
     return findings
 

@@ -130,9 +130,9 @@ def _registry() -> Any:
 @cache
 def _factor(written: str, unit: str) -> float:
     """Factor from the `written` unit to the SI `unit`."""
+    registry = _registry()  # before pint is imported anywhere else, see there
     import pint
 
-    registry = _registry()
     try:
         source = registry.parse_units(_to_expression(written))
     except pint.UndefinedUnitError as fault:
