@@ -35,7 +35,8 @@ def main(arguments: list[str] | None = None) -> int:
         where = f"{error.filename}: " if error.filename else ""
         return _report(error, f"{where}{error.strerror or error}", 2, given, debug)
     except Exception as error:
-        message = f"internal error: {type(error).__name__}: {error} (--debug shows where)"
+        first = next(iter(str(error).splitlines()), "")
+        message = f"internal error: {type(error).__name__}: {first} (--debug shows where)"
         return _report(error, message, 1, given, debug)
     return 0
 

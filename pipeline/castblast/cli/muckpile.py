@@ -17,14 +17,18 @@ def muckpile(
     out: OutFolder = None,
     balls: Annotated[
         int | None,
-        typer.Option(min=10, help="About this many balls (changes their size).", show_default=False),
+        typer.Option(
+            min=10, help="About this many balls (changes their size).", show_default=False
+        ),
     ] = None,
     threads: Annotated[
         int | None, typer.Option(min=1, help="Threads; default: all cores.", show_default=False)
     ] = None,
     velocity: Annotated[
         str | None,
-        typer.Option(help='Burden velocity instead of the file\'s, "12.7 m/s".', show_default=False),
+        typer.Option(
+            help='Burden velocity instead of the file\'s, "12.7 m/s".', show_default=False
+        ),
     ] = None,
 ) -> Mapping[str, Any]:
     """Pack, fire and settle a bench; writes final state, profile, pictures and metrics."""

@@ -25,5 +25,7 @@ ExplosiveName: TypeAlias = Annotated[
 ]
 Workers: TypeAlias = Annotated[
     int | None,
-    typer.Option("--workers", min=1, help="Worker threads; default: all cores.", show_default=False),
+    typer.Option(
+        "--workers", min=1, help="Worker threads; default: all cores.", show_default=False
+    ),
 ]

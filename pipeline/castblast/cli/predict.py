@@ -26,7 +26,9 @@ def predict(
     settings: Settings = None,
     csv: Annotated[
         Path | None,
-        typer.Option(help="Designs as CSV, one a row; heads like 'burden [m]'.", show_default=False),
+        typer.Option(
+            help="Designs as CSV, one a row; heads like 'burden [m]'.", show_default=False
+        ),
     ] = None,
     network: Annotated[
         Path | None, typer.Option(help="Another network.json.", show_default=False)

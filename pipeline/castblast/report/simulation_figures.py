@@ -9,7 +9,17 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.report.style import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, new_figure, save_figure
+from castblast.report.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    RED,
+    SKY,
+    new_figure,
+    save_figure,
+)
 
 
 class NearFieldHistory(Protocol):

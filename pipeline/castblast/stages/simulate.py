@@ -7,17 +7,21 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from castblast.blast import BlastCase, BlastResult, make_case, result_values, run_blast
+from castblast.blast import (
+    BlastResult,
+    BlastSettings,
+    make_case,
+    resolve_inputs,
+    result_values,
+    run_blast,
+)
 from castblast.errors import SimulationError, Status
-from castblast.nearfield.case import EndMode, NearFieldSettings, TensionMode
+from castblast.files import write_csv, write_text
+from castblast.nearfield.case import EndMode, TensionMode
 from castblast.specs.case import parse_values
 from castblast.specs.explosive import load_explosive
 from castblast.stages.explosives import require_consistent
-from castblast.files import write_csv, write_text
 from castblast.variables import VARIABLES
-
-#: Inputs that are settings of the near-field solver, not of the design.
-_SOLVER_NAMES = ("outer_radius", "zones", "quadratic_viscosity", "linear_viscosity")
 
 
 @dataclass(frozen=True)
@@ -67,41 +71,35 @@ def simulate(
     given = parse_values(values, where)
     spec = load_explosive(explosive)
     remarks = require_consistent(spec, allow_inconsistent=allow_inconsistent)
-    case = make_case(
-        spec.to_explosive(),
-        {name: value for name, value in given.items() if name not in _SOLVER_NAMES},
-        near_field=_settings(given, mode, tension),
+    products = spec.to_explosive()
+    inputs = resolve_inputs(given, products, parameter_set)
+    settings = BlastSettings(
+        mode=EndMode[mode.upper()],
+        tension=TensionMode[tension.upper()],
         parameter_set=parameter_set,
     )
+    case = make_case(products, inputs, settings)
     result = run_blast(case)
-    document = _document(spec.name, mode, parameter_set, case, result)
+    document = _document(spec.name, mode, parameter_set, inputs, result)
     status = Status(result.status)
     if status is not Status.OK:
         message = f"{spec.name}: the simulation failed ({status.name}): {status.meaning}"
         raise SimulationError(message)
     if not result.near_field.settled:
         remarks.append("the hole wall was still moving at the end (settled: false)")
-    if given.get("charge_diameter", 0.0) not in (0.0, case.near_field.hole.diameter):
+    if inputs["charge_diameter"] < inputs["hole_diameter"]:
         remarks.append("decoupled charge: the work of the gas on the air gap is neglected")
-    files = [] if out is None else _write(out, document, case, result)
+    files = [] if out is None else _write(out, document, result)
     title = f"{spec.name}, {mode} mode, {parameter_set} parameters"
     return SimulationOutcome(document, title, _rows(document), remarks, files)
 
 
-def _settings(given: Mapping[str, float], mode: str, tension: str) -> NearFieldSettings:
-    defaults = NearFieldSettings()
-    return NearFieldSettings(
-        mode=EndMode[mode.upper()],
-        tension=TensionMode[tension.upper()],
-        outer_radius=given.get("outer_radius", defaults.outer_radius),
-        zones=round(given.get("zones", defaults.zones)),
-        quadratic_viscosity=given.get("quadratic_viscosity", defaults.quadratic_viscosity),
-        linear_viscosity=given.get("linear_viscosity", defaults.linear_viscosity),
-    )
-
-
 def _document(
-    name: str, mode: str, parameter_set: str, case: BlastCase, result: BlastResult
+    name: str,
+    mode: str,
+    parameter_set: str,
+    inputs: Mapping[str, float],
+    result: BlastResult,
 ) -> dict[str, Any]:
     outputs: dict[str, Any] = dict(result_values(result))
     outputs["settled"] = bool(result.near_field.settled)
@@ -111,7 +109,7 @@ def _document(
         "parameter_set": parameter_set,
         "status": Status(result.status).name.lower(),
         **outputs,
-        "inputs": dict(case.inputs),
+        "inputs": dict(inputs),
     }
 
 
@@ -126,9 +124,7 @@ def _rows(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     return rows
 
 
-def _write(
-    out: Path, document: Mapping[str, Any], case: BlastCase, result: BlastResult
-) -> list[Path]:
+def _write(out: Path, document: Mapping[str, Any], result: BlastResult) -> list[Path]:
     import json
 
     from castblast.report.simulation_figures import draw_simulation
