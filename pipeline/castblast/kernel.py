@@ -27,10 +27,10 @@ _SOURCES = ("explosive", "kernel.py", "nearfield", "burden", "muckpile")
 
 
 @cache
-def source_hash() -> str:
-    """SHA-256 over every source that can change a simulated number (hex, 64 characters)."""
+def source_hash(entries: tuple[str, ...] = _SOURCES) -> str:
+    """SHA-256 (hex) over sources of the package; by default all that hold kernels."""
     digest = hashlib.sha256()
-    for entry in _SOURCES:
+    for entry in entries:
         path = _PACKAGE / entry
         for source in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
             digest.update(source.relative_to(_PACKAGE).as_posix().encode())

@@ -66,7 +66,7 @@ def _attribute_faults(dataset: xr.Dataset) -> list[Fault]:
     ]
     if attributes.get("schema", SCHEMA) != SCHEMA:
         faults.append(Fault("attribute schema", f"is '{attributes['schema']}', not '{SCHEMA}'"))
-    for name in ("dependency_versions", "explosive_specs", "recipe_resolved"):
+    for name in ("dependency_versions", "explosive_specs", "made_from"):
         try:
             json.loads(str(attributes.get(name, "{}")))
         except ValueError:

@@ -160,7 +160,9 @@ def _quantiles(spec: VariableSpec, shares: FloatArray) -> FloatArray:
         values = np.exp(np.log(low) + shares * (np.log(high) - np.log(low)))
     else:
         values = low + shares * (high - low)
-    return np.clip(values, low, high)  # rounding of exp and log must not leave the range
+    return np.asarray(
+        np.clip(values, low, high)
+    )  # rounding of exp and log must not leave the range
 
 
 def _balanced(size: int, kinds: int, rng: np.random.Generator) -> NDArray[np.int8]:

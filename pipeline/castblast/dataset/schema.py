@@ -54,7 +54,7 @@ REQUIRED_ATTRIBUTES = (
     "processing_level", "comment", "license", "creator_name", "product_version", "references",
     "schema", "schema_version", "name", "dataset_version", "recipe", "recipe_sha256",
     "rows_sha256", "source_sha256", "castblast_version", "dependency_versions", "explosive_specs",
-    "recipe_resolved", "design_method", "design_seed", "designs_drawn", "n_ok", "n_failed",
+    "made_from", "design_method", "design_seed", "designs_drawn", "n_ok", "n_failed",
     "content_sha256",
 )  # fmt: skip
 

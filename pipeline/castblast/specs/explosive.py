@@ -251,20 +251,35 @@ def load_explosive(name_or_path: str | Path) -> ExplosiveSpec:
     SpecError
         Unknown name (the nearest is named), or faults of the file.
     """
+    return load_spec(find_explosive(name_or_path), ExplosiveSpec)
+
+
+def find_explosive(name_or_path: str | Path) -> Path:
+    """Path of the file of an explosive: of the catalogue, by name or alias, or a user's own.
+
+    Raises
+    ------
+    SpecError
+        Unknown name; the nearest is named.
+    """
     text = str(name_or_path)
     path = Path(text)
     if path.suffix or path.parent != Path() or path.is_file():
-        return load_spec(path, ExplosiveSpec)
+        return path
     wanted = text.strip().lower().replace(" ", "_").replace("-", "_")
     for name in explosive_names():
         if wanted == name or wanted in _catalogue_entry(name).aliases:
-            return _catalogue_entry(name)
+            return _catalogue_path(name)
     known = ", ".join(explosive_names())
     hint = nearest_name(wanted, explosive_names())
     message = f"unknown explosive '{text}'{hint or ';'} known: {known}; or the path of a YAML file"
     raise SpecError(message)
 
 
+def _catalogue_path(name: str) -> Path:
+    return resource(_FOLDER) / f"{name}.yaml"
+
+
 @cache
 def _catalogue_entry(name: str) -> ExplosiveSpec:
-    return load_spec(resource(_FOLDER) / f"{name}.yaml", ExplosiveSpec)
+    return load_spec(_catalogue_path(name), ExplosiveSpec)

@@ -1,0 +1,96 @@
+"""Where a dataset comes into being: its file, and the folder of its shards until it is finished.
+
+A stopped run goes on only with shards made from exactly the same; a finished dataset is never
+overwritten by another one unless that is asked for.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from castblast.dataset.provenance import differences
+from castblast.dataset.store import read_file, require_writable
+from castblast.errors import DatasetError, SpecError
+from castblast.files import write_text
+
+_NOTE = "made_from.json"
+
+
+def work_folder(path: Path) -> Path:
+    """Folder of the shards of the dataset `path`, beside it."""
+    return path.with_suffix(".work")
+
+
+def is_finished(path: Path, origin: Mapping[str, Any]) -> bool:
+    """Say whether the dataset is there, whole, and made from the same.
+
+    A damaged file is moved aside, to be made again.
+
+    Raises
+    ------
+    SpecError
+        Another dataset or something else has that name.
+    """
+    if not path.exists():
+        return False
+    try:
+        found = read_file(path)
+    except DatasetError:
+        path.replace(path.with_suffix(".nc.cut"))
+        return False
+    try:
+        old = json.loads(found.attrs["made_from"])
+    except (KeyError, ValueError):
+        message = f"{path}: is not a dataset of castblast; choose another name with --out"
+        raise SpecError(message) from None
+    if old != origin:
+        raise SpecError(_stale(path, old, origin))
+    return True
+
+
+def open_work_folder(path: Path, origin: Mapping[str, Any], *, restart: bool) -> Path:
+    """Make the folder of the shards, or make sure that those in it are ours.
+
+    Raises
+    ------
+    SpecError
+        The shards were made from something else; the difference and the ways on are named.
+    DatasetError
+        The folder cannot be written to.
+    """
+    folder = work_folder(path)
+    if restart and folder.exists():
+        shutil.rmtree(folder)
+    require_writable(folder)
+    old = _read_note(folder / _NOTE)
+    if old and old != origin:
+        raise SpecError(_stale(folder, old, origin))
+    write_text(folder / _NOTE, json.dumps(dict(origin), indent=1, sort_keys=True) + "\n")
+    return folder
+
+
+def close_work_folder(path: Path) -> None:
+    """Remove the shards of a finished dataset."""
+    shutil.rmtree(work_folder(path))
+
+
+def _read_note(path: Path) -> dict[str, Any]:
+    """Read what the shards were made from; empty if that cannot be read (shards tell as well)."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}
+
+
+def _stale(place: Path, old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
+    """Name what changed and the two ways on."""
+    changes = "\n".join(f"  {line}" for line in differences(old, new))
+    return (
+        f"{place}: was made from something else than now asked for:\n{changes}\n"
+        "  either discard it with --restart, or give the recipe a new name or version"
+    )

@@ -1,0 +1,197 @@
+"""Work on a written dataset: check it, describe it, recompute one of its samples."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from castblast.dataset.card import training_statistics
+from castblast.dataset.check import check
+from castblast.dataset.failures import summary
+from castblast.dataset.provenance import SOURCES, explosive_from_text
+from castblast.dataset.schema import flag_names, names_with_role
+from castblast.dataset.simulation import blast_simulator
+from castblast.dataset.store import open_dataset
+from castblast.errors import SpecError, Status
+from castblast.kernel import source_hash
+from castblast.specs.recipe import recipe_from_text
+from castblast.variables import INPUT_NAMES, OUTPUT_NAMES, VARIABLES
+
+#: Deviation up to which a recomputed number is the same: last digits differ between processors.
+SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class Description:
+    """A dataset in words: lines, a table of its variables, and all of it for programs."""
+
+    lines: tuple[str, ...]
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    document: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """A stored sample beside the same sample computed again."""
+
+    same: bool
+    verdict: str
+    rows: tuple[tuple[str, ...], ...]
+    document: dict[str, Any]
+
+
+def check_dataset(path: Path) -> list[str]:
+    """Report every departure of a file from the format; empty if there is none.
+
+    Raises
+    ------
+    DatasetError
+        The file cannot be read as a dataset at all.
+    """
+    return [str(fault) for fault in check(open_dataset(path))]
+
+
+def describe_dataset(path: Path) -> Description:
+    """Say what a dataset holds: rows, splits, failures, ranges, where it comes from.
+
+    Raises
+    ------
+    DatasetError
+        The file cannot be read as a dataset.
+    """
+    dataset = open_dataset(path)
+    attributes = dataset.attrs
+    counts = {
+        name: dict(zip(*_unique(flag_names(dataset[name])), strict=True))
+        for name in ("explosive", "split", "status")
+    }
+    variables = {
+        name: {"role": role, "units": VARIABLES[name].unit, **training_statistics(dataset, name)}
+        for role in ("input", "derived", "fixed", "target", "diagnostic")
+        for name in names_with_role(dataset, role)
+    }
+    lines = (
+        f"{attributes['id']}: {attributes['title']}",
+        summary(dataset["status"].to_numpy()),
+        *(
+            f"{name}: {', '.join(f'{key} {count}' for key, count in counts[name].items())}"
+            for name in ("explosive", "split")
+        ),
+        f"made by castblast {attributes['castblast_version']}, content "
+        f"{attributes['content_sha256']}",
+    )
+    rows = tuple(
+        (
+            name,
+            str(entry["role"]),
+            VARIABLES[name].shown_unit,
+            *(
+                f"{float(entry[key]) * VARIABLES[name].display_factor:.5g}"
+                for key in ("mean", "std", "min", "max")
+            ),
+        )
+        for name, entry in variables.items()
+        if entry["role"] != "fixed"
+    )
+    header = ("variable", "role", "unit", "mean", "std", "min", "max")
+    document = {
+        "dataset": str(path),
+        "id": attributes["id"],
+        "size": dataset.sizes["sample"],
+        **counts,
+        "variables": variables,
+        "content_sha256": attributes["content_sha256"],
+        "recipe_sha256": attributes["recipe_sha256"],
+    }
+    return Description(lines, header, rows, document)
+
+
+def reproduce_sample(path: Path, sample: int) -> Reproduction:
+    """Compute one sample again from the file alone and compare every output.
+
+    Parameters
+    ----------
+    sample : int
+        Stable id.
+
+    Raises
+    ------
+    DatasetError
+        The file cannot be read as a dataset.
+    SpecError
+        No such sample, or a recipe that this version cannot read.
+    """
+    dataset = open_dataset(path)
+    position = _position(dataset, sample, path)
+    stored = dataset.isel(sample=position)
+    recipe = recipe_from_text(dataset.attrs["recipe"], f"{path}: recipe")
+    texts = json.loads(dataset.attrs["explosive_specs"])
+    name = str(flag_names(dataset["explosive"])[position])
+    explosive = explosive_from_text(texts[name], f"{path}: {name}").spec.to_explosive()
+    inputs = {key: np.array([float(stored[key])]) for key in INPUT_NAMES}
+    result = blast_simulator(recipe, (explosive,)).run(inputs, np.zeros(1, dtype=np.int8))
+    values = {key: (float(stored[key]), float(result.outputs[key][0])) for key in OUTPUT_NAMES}
+    deviations = {key: _deviation(key, *pair) for key, pair in values.items()}
+    worst = max(deviations, key=lambda key: deviations[key])
+    statuses = (Status(int(stored["status"])), Status(int(result.status[0])))
+    same = statuses[0] == statuses[1] and deviations[worst] <= SAME
+    verdict = f"sample {sample}: " + _verdict(same, statuses, worst, deviations[worst])
+    if not same and dataset.attrs["source_sha256"] != source_hash(SOURCES):
+        verdict += "; the code of the physics is not the one that made the file"
+    rows = tuple(
+        (key, *(VARIABLES[key].show(value) for value in values[key]), f"{deviations[key]:.1e}")
+        for key in OUTPUT_NAMES
+    )
+    document = {
+        "dataset": str(path),
+        "sample": sample,
+        "same": same,
+        "status": [status.name.lower() for status in statuses],
+        "stored": {key: pair[0] for key, pair in values.items()},
+        "recomputed": {key: pair[1] for key, pair in values.items()},
+        "relative_difference": deviations,
+    }
+    return Reproduction(same, verdict, rows, document)
+
+
+def _position(dataset: xr.Dataset, sample: int, path: Path) -> int:
+    ids = dataset["sample"].to_numpy()
+    found = np.flatnonzero(ids == sample)
+    if not len(found):
+        message = f"{path}: no sample {sample}; ids are {ids.min()} to {ids.max()}"
+        raise SpecError(message)
+    return int(found[0])
+
+
+def _deviation(name: str, stored: float, computed: float) -> float:
+    """Relative to the larger of the two; two NaNs are equal, one NaN is infinitely far.
+
+    A residual is the rounding of a balance: it is relative already.
+    """
+    if np.isnan(stored) and np.isnan(computed):
+        return 0.0
+    if np.isnan(stored) or np.isnan(computed):
+        return float("inf")
+    scale = 1.0 if name.endswith("residual") else max(abs(stored), abs(computed))
+    return abs(stored - computed) / scale if scale else 0.0
+
+
+def _verdict(same: bool, statuses: tuple[Status, Status], worst: str, deviation: float) -> str:
+    if statuses[0] != statuses[1]:
+        stored, computed = (status.name.lower() for status in statuses)
+        return f"status was {stored}, is {computed} now"
+    if same:
+        exactly = "bit for bit" if deviation == 0.0 else f"to {deviation:.1e} relative"
+        return f"reproduced {exactly}"
+    return f"differs, most in {worst} ({deviation:.1e} relative)"
+
+
+def _unique(names: np.ndarray[Any, np.dtype[np.str_]]) -> tuple[list[str], list[int]]:
+    found, counts = np.unique(names, return_counts=True)
+    return found.tolist(), counts.tolist()

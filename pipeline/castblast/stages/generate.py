@@ -1,0 +1,157 @@
+"""From a recipe to a dataset: design, simulate, check, write, describe."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from castblast.dataset.assemble import assemble
+from castblast.dataset.build import build_shards
+from castblast.dataset.card import write_card
+from castblast.dataset.check import check
+from castblast.dataset.design import make_design
+from castblast.dataset.failures import require_success, summary
+from castblast.dataset.provenance import ExplosiveSource, load_explosives, made_from, rows_hash
+from castblast.dataset.shards import join_shards, make_tasks
+from castblast.dataset.simulation import Simulator, blast_simulator
+from castblast.dataset.store import open_dataset, require_writable, write_dataset
+from castblast.dataset.workplace import close_work_folder, is_finished, open_work_folder
+from castblast.errors import CheckError
+from castblast.progress import ProgressCallback, silent
+from castblast.specs.recipe import RecipeSource, load_recipe
+
+CARD_NAME = "DATASHEET.md"
+
+
+@dataclass(frozen=True)
+class GenerateOutcome(os.PathLike[str]):
+    """What was generated; stands for the path of the dataset where a path is needed.
+
+    Attributes
+    ----------
+    path : Path
+    lines : tuple of str
+        What was done, for people.
+    document : dict
+        The same for programs.
+    """
+
+    path: Path
+    lines: tuple[str, ...]
+    document: dict[str, Any]
+
+    def __fspath__(self) -> str:
+        """Path of the dataset."""
+        return str(self.path)
+
+
+def generate(
+    recipe: Path,
+    out: Path | None = None,
+    *,
+    size: int | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    restart: bool = False,
+    progress: ProgressCallback = silent,
+) -> GenerateOutcome:
+    """Build the dataset of a recipe file; goes on where an earlier run of it was stopped.
+
+    Parameters
+    ----------
+    recipe : Path
+    out : Path, optional
+        The netCDF file, or a folder for it; default: ``data/NAME/VERSION/data.nc``.
+    size : int, optional
+        Rows instead of those of the recipe.
+    workers : int, optional
+        Threads; default: one per core that may be used.
+    scheduler : str, optional
+        Address of a running Dask scheduler whose workers see the folder of `out`.
+    restart : bool
+        Discard what an earlier run left.
+
+    Raises
+    ------
+    SpecError
+        Faults of recipe or explosives, impossible designs, results of another recipe in the way.
+    DatasetError
+        Nothing can be written there.
+    SimulationError
+        More failed samples than the recipe allows; the shards are kept.
+    """
+    source = load_recipe(recipe, size)
+    explosives = load_explosives(source)
+    simulator = blast_simulator(
+        source.recipe, tuple(entry.spec.to_explosive() for entry in explosives)
+    )
+    path = _output_path(source, out)
+    return produce(
+        source,
+        explosives,
+        simulator,
+        path,
+        workers=workers,
+        scheduler=scheduler,
+        restart=restart,
+        progress=progress,
+    )
+
+
+def produce(
+    source: RecipeSource,
+    explosives: tuple[ExplosiveSource, ...],
+    simulator: Simulator,
+    path: Path,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    restart: bool = False,
+    progress: ProgressCallback = silent,
+) -> GenerateOutcome:
+    """Build a dataset with a given simulator; see `generate`."""
+    recipe = source.recipe
+    require_writable(path.parent)
+    origin = made_from(recipe, explosives)
+    if not restart and is_finished(path, origin):
+        line = f"{path}: finished already, from the same recipe"
+        return GenerateOutcome(path, (line,), _document(path))
+    design = make_design(recipe, simulator)
+    folder = open_work_folder(path, origin, restart=restart)
+    tasks = make_tasks(design, simulator, rows_hash(origin), folder.resolve(), recipe.shard_size)
+    lines = build_shards(tasks, workers=workers, scheduler=scheduler, progress=progress)
+    progress(1.0, "writing the dataset")
+    results = join_shards(tasks)
+    require_success(recipe, tuple(entry.name for entry in explosives), design, results.status)
+    dataset = assemble(source, explosives, design, results)
+    faults = check(dataset)
+    if faults:  # a fault of the physics or ours: better no dataset than a wrong one
+        message = f"{path}: not written, as it does not pass its own check:\n"
+        raise CheckError(message + "\n".join(f"  {fault}" for fault in faults))
+    write_dataset(dataset, path)
+    card = write_card(dataset, path.with_name(CARD_NAME))
+    close_work_folder(path)
+    lines += [
+        summary(results.status),
+        f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB, content "
+        f"{dataset.attrs['content_sha256'][:12]}) and {card.name}",
+    ]
+    return GenerateOutcome(path, tuple(lines), _document(path))
+
+
+def _output_path(source: RecipeSource, out: Path | None) -> Path:
+    if out is None:
+        return Path("data") / source.recipe.name / source.recipe.version / "data.nc"
+    return out if out.suffix == ".nc" else out / "data.nc"
+
+
+def _document(path: Path) -> dict[str, Any]:
+    attributes = open_dataset(path).attrs
+    keys = ("id", "n_ok", "n_failed", "designs_drawn", "recipe_sha256", "content_sha256")
+    return {"path": str(path), **{key: _plain(attributes[key]) for key in keys}}
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if hasattr(value, "item") else value
