@@ -558,6 +558,9 @@ VARIABLES: dict[str, Variable] = {v.name: v for v in INPUTS + OUTPUTS}
 INPUT_NAMES: tuple[str, ...] = tuple(v.name for v in INPUTS)
 OUTPUT_NAMES: tuple[str, ...] = tuple(v.name for v in OUTPUTS)
 
+#: Stemming length over burden where neither stemming nor charge length is given.
+STEMMING_RATIO = 0.7
+
 #: Named parameter sets of the burden-motion model. `authors` reproduces the level of the published
 #: web tool of Furtney et al.; `field` is anchored on measured gas-front speeds. Both calibrated.
 BURDEN_PARAMETER_SETS: dict[str, dict[str, float]] = {

@@ -40,9 +40,11 @@ def predict(
     inputs that lie outside the training data are named.
     """
     from castblast.specs.case import split_assignments
-    from castblast.stages.predict import predict_csv, predict_design
+    from castblast.stages.predict import predict_design
 
     if csv is not None:
+        from castblast.stages.predict_table import predict_csv
+
         table = predict_csv(csv, network)
         if not screen.as_json:
             screen.say(table.text.rstrip())

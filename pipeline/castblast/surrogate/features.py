@@ -9,24 +9,35 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from castblast.dataset.schema import flag_names
 from castblast.errors import DatasetError, nearest_name
 from castblast.network import Constraint, Floats, InputColumn, Transform
-from castblast.variables import VARIABLES
+from castblast.variables import INPUT_NAMES, VARIABLES
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
 Split = Literal["train", "valid", "calibration", "test"]
-SPLITS: tuple[Split, ...] = ("train", "valid", "calibration", "test")
+SPLITS: tuple[Split, ...] = get_args(Split)
 
 #: Fewest rows per split: 39 is the least that gives a finite 95 % band with a row to spare.
 MINIMUM_ROWS: Mapping[Split, int] = {"train": 100, "valid": 20, "calibration": 39, "test": 20}
+#: Ratios whose range in training bounds the domain: name, numerator, denominator, both sides?
+_RATIOS: tuple[tuple[str, dict[str, float], str, bool], ...] = (
+    (
+        "bench height less charge length",
+        {"bench_height": 1.0, "charge_length": -1.0},
+        "burden",
+        True,
+    ),
+    ("charge length", {"charge_length": 1.0}, "hole_diameter", False),
+)
 _PROVENANCE = ("name", "dataset_version", "content_sha256", "recipe_sha256")
 
 
@@ -48,6 +59,8 @@ class Table:
         One of `SPLITS` for each row.
     source : mapping
         Name, version and hashes of the dataset.
+    held : mapping of input name to float [SI]
+        Inputs that the dataset holds at one value.
     """
 
     frame: pd.DataFrame
@@ -56,7 +69,8 @@ class Table:
     explosives: tuple[str, ...]
     sample: NDArray[np.int64]
     split: NDArray[np.str_]
-    source: Mapping[str, Any]
+    source: Mapping[str, str]
+    held: Mapping[str, float]
 
     @property
     def feature_names(self) -> tuple[str, ...]:
@@ -121,6 +135,7 @@ def read_table(dataset: xr.Dataset, features: Sequence[str], targets: Sequence[s
         explosives=tuple(sorted({str(name) for name in columns["explosive"]})),
         sample=dataset["sample"].to_numpy()[ok].astype(np.int64),
         split=_labels(dataset["split"])[ok],
+        held=_held(dataset, features),
         source={key: str(dataset.attrs[key]) for key in _PROVENANCE if key in dataset.attrs},
     )
     faults = _faults(table, dropped=dataset.sizes["sample"] - len(ok))
@@ -129,19 +144,34 @@ def read_table(dataset: xr.Dataset, features: Sequence[str], targets: Sequence[s
     return table
 
 
+def _held(dataset: xr.Dataset, features: Sequence[str]) -> dict[str, float]:
+    """Inputs beside the features that have one value in every row."""
+    held = {}
+    for name in INPUT_NAMES:
+        if name in dataset.data_vars and name not in features:
+            values = np.unique(dataset[name].to_numpy())
+            if len(values) == 1:
+                held[name] = float(values[0])
+    return held
+
+
 def _labels(variable: xr.DataArray) -> NDArray[np.str_]:
-    """Names per sample of a CF flag variable, or of one that holds names already."""
-    values = variable.to_numpy()
-    if not np.issubdtype(values.dtype, np.integer):
-        return values.astype(str)
+    """Names per sample of a CF flag variable.
+
+    Raises
+    ------
+    DatasetError
+        It has no meanings, or a value beyond them.
+    """
     meanings = str(variable.attrs.get("flag_meanings", "")).split()
-    flags = np.atleast_1d(variable.attrs.get("flag_values", np.arange(len(meanings))))
-    names = dict(zip(flags.tolist(), meanings, strict=False))
-    unknown = sorted(set(values.tolist()) - set(names))
-    if unknown:
-        message = f"{variable.name}: value {unknown[0]} has no entry in flag_meanings"
+    values = variable.to_numpy()
+    if not np.issubdtype(values.dtype, np.integer) or not meanings:
+        message = f"{variable.name}: is no flag variable (integers with flag_meanings)"
         raise DatasetError(message)
-    return np.array([names[value] for value in values.tolist()], dtype=str)
+    if values.size and not 0 <= values.min() <= values.max() < len(meanings):
+        message = f"{variable.name}: a value has no entry in flag_meanings ({' '.join(meanings)})"
+        raise DatasetError(message)
+    return flag_names(variable)
 
 
 def _faults(table: Table, dropped: int) -> list[str]:
@@ -217,25 +247,26 @@ def domain_constraints(table: Table) -> tuple[Constraint, ...]:
     """Rules of the domain that no box of single inputs can say, read off the training rows.
 
     Charge length, bench height and burden are tied: what the charge leaves of the hole is its
-    stemming, and that was only trained between two multiples of the burden.
+    stemming, and that was only trained between two multiples of the burden. A charge was never
+    shorter than some multiple of its diameter.
     """
-    if not {"bench_height", "charge_length", "burden"} <= set(table.feature_names):
-        return ()
-    train = table.frame.iloc[table.rows("train")]
-    ratio = (train["bench_height"] - train["charge_length"]) / train["burden"]
-    # A hair outward, so that rounding of the linear form keeps every training row inside.
-    least, most = float(ratio.min()) - 1e-9, float(ratio.max()) + 1e-9
-    return (
-        Constraint(
-            f"bench height less charge length at least {least:.3g} burden",
-            {"bench_height": 1.0, "charge_length": -1.0, "burden": -least},
-            0.0,
-            "m",
-        ),
-        Constraint(
-            f"bench height less charge length at most {most:.3g} burden",
-            {"bench_height": -1.0, "charge_length": 1.0, "burden": most},
-            0.0,
-            "m",
-        ),
-    )
+    rules = []
+    for label, parts, base, two_sided in _RATIOS:
+        if not {*parts, base} <= set(table.feature_names):
+            continue
+        train = table.frame.iloc[table.rows("train")]
+        ratio = sum(c * train[name] for name, c in parts.items()) / train[base]
+        # A hair outward, so that rounding of the linear form keeps every training row inside.
+        least, most = float(ratio.min()) - 1e-9, float(ratio.max()) + 1e-9
+        shown = base.replace("_", " ")
+        rules.append(
+            Constraint(f"{label} at least {least:.3g} {shown}", {**parts, base: -least}, 0.0, "m")
+        )
+        if two_sided:
+            negative = {name: -c for name, c in parts.items()}
+            rules.append(
+                Constraint(
+                    f"{label} at most {most:.3g} {shown}", {**negative, base: most}, 0.0, "m"
+                )
+            )
+    return tuple(rules)

@@ -187,6 +187,7 @@ def _provenance(
     return {
         "castblast_version": __version__,
         "dataset": dict(table.source),
+        "held_inputs": dict(table.held),
         "spec": spec.model_dump(mode="json"),
         "spec_sha256": spec.sha256(),
         "rows": {split: len(table.rows(split)) for split in SPLITS},

@@ -1,0 +1,210 @@
+"""Pictures of a surrogate: the paper's Figure 2 redrawn from our own run, and all targets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from castblast.report.style import CYCLE, GREY, ORANGE, new_figure, save_figure
+from castblast.variables import VARIABLES
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LearningLine:
+    """95 % relative error of one target against the number of training rows.
+
+    Attributes
+    ----------
+    target : str
+    rows : sequence of int
+    train, test : sequence of float
+        Fractions, not percent.
+    """
+
+    target: str
+    rows: Sequence[int]
+    train: Sequence[float]
+    test: Sequence[float]
+
+
+@dataclass(frozen=True)
+class HeldOutRows:
+    """What a model said about the rows it never saw.
+
+    Attributes
+    ----------
+    truth, predicted : mapping of target name to (n,) [SI]
+    explosive : (n,) of str
+    scores : mapping of target name to mapping
+        ``r2`` and ``relative_error_95`` (fraction) on these rows.
+    by_explosive : mapping of explosive to such a mapping
+    """
+
+    truth: Mapping[str, Floats]
+    predicted: Mapping[str, Floats]
+    explosive: NDArray[np.str_]
+    scores: Mapping[str, Mapping[str, float]]
+    by_explosive: Mapping[str, Mapping[str, Mapping[str, float]]]
+
+    def errors(self, target: str) -> Floats:
+        """Relative errors in percent, signed."""
+        truth = self.truth[target]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(100.0 * (self.predicted[target] - truth) / np.abs(truth))
+
+
+def draw_figure_two(
+    path: Path,
+    title: str,
+    lines: Sequence[LearningLine],
+    rows: HeldOutRows,
+    *,
+    target: str = "burden_velocity",
+    marks: Mapping[str, float],
+) -> Path:
+    """Draw learning curve, error histogram, predicted against actual, error by explosive.
+
+    Parameters
+    ----------
+    path : path
+        Picture to write (PNG or SVG).
+    title : str
+        Name of the model.
+    lines : sequence of LearningLine
+        One per target.
+    rows : HeldOutRows
+    target : str
+        The target of the histogram and of predicted against actual.
+    marks : mapping
+        Published ``relative_error_95`` (fraction), ``r2`` and ``runs``.
+    """
+    figure, axes = new_figure(2, 2, width=9.4, height=7.4)
+    _draw_learning(axes[0, 0], lines, target, marks)
+    _draw_histogram(axes[0, 1], rows, target, marks)
+    _draw_parity(axes[1, 0], rows, target)
+    _draw_by_explosive(axes[1, 1], rows, marks)
+    figure.suptitle(title, fontsize=11)
+    return save_figure(figure, path)
+
+
+def draw_parity(path: Path, title: str, rows: HeldOutRows) -> Path:
+    """Draw predicted against actual for every target on the test rows."""
+    targets = list(rows.truth)
+    figure, axes = new_figure(
+        (len(targets) + 1) // 2, 2, width=9.0, height=4.0 * ((len(targets) + 1) // 2), squeeze=False
+    )
+    for axis, target in zip(axes.ravel(), targets, strict=False):
+        _draw_parity(axis, rows, target)
+    for axis in axes.ravel()[len(targets) :]:
+        axis.set_visible(False)
+    figure.suptitle(title, fontsize=11)
+    return save_figure(figure, path)
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _draw_learning(
+    axis: Any, lines: Sequence[LearningLine], target: str, marks: Mapping[str, float]
+) -> None:
+    for line, colour in zip(lines, CYCLE, strict=False):
+        main = line.target == target
+        style = {"color": colour, "marker": "o", "markersize": 4 if main else 2.5}
+        width = 2.0 if main else 1.0
+        test = 100.0 * np.asarray(line.test, dtype=float)
+        axis.loglog(line.rows, test, label=_words(line.target), linewidth=width, **style)
+        if main:
+            train = 100.0 * np.asarray(line.train, dtype=float)
+            axis.loglog(
+                line.rows, train, ":", color=colour, linewidth=1.2, label="   training rows"
+            )
+    mark = 100.0 * marks["relative_error_95"]
+    axis.plot(
+        marks["runs"], mark, "*", markersize=12, color=ORANGE, markeredgecolor="black",
+        markeredgewidth=0.5, linestyle="none", label=f"paper, velocity: {mark:g} %", zorder=5,
+    )  # fmt: skip
+    axis.set(
+        title="a) Learning curve, test rows",
+        xlabel="training rows",
+        ylabel="95 % of errors below [%]",
+    )
+    _plain_log_ticks(axis.yaxis)
+    sizes = sorted({size for line in lines for size in line.rows})
+    axis.set_xticks(sizes, [f"{size:,}" for size in sizes], rotation=30)
+    axis.minorticks_off()
+    axis.legend(fontsize=7)
+
+
+def _plain_log_ticks(axis: Any) -> None:
+    from matplotlib.ticker import FuncFormatter, LogLocator
+
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+
+
+def _draw_histogram(axis: Any, rows: HeldOutRows, target: str, marks: Mapping[str, float]) -> None:
+    errors = rows.errors(target)
+    mark = 100.0 * marks["relative_error_95"]
+    reach = max(1.6 * mark, 150.0 * rows.scores[target]["relative_error_95"])
+    inside = float(np.mean(np.abs(errors) <= mark))
+    clipped = np.clip(errors, -reach, reach)
+    axis.hist(clipped, bins=np.linspace(-reach, reach, 61), color=CYCLE[0])
+    for side in (-mark, mark):
+        axis.axvline(side, color=ORANGE, linewidth=1.4)
+    axis.text(
+        0.98, 0.96, f"{inside:.1%} of {len(errors):,} rows\nwithin ±{mark:g} %",
+        transform=axis.transAxes, ha="right", va="top", fontsize=8,
+    )  # fmt: skip
+    axis.set(
+        title=f"b) Error of {_words(target)}, test rows",
+        xlabel="relative error [%]; what lies beyond is in the outer bins",
+        ylabel="rows",
+    )
+
+
+def _draw_parity(axis: Any, rows: HeldOutRows, target: str) -> None:
+    variable = VARIABLES[target]
+    truth = rows.truth[target] * variable.display_factor
+    predicted = rows.predicted[target] * variable.display_factor
+    ends = [float(min(truth.min(), predicted.min())), float(max(truth.max(), predicted.max()))]
+    axis.plot(ends, ends, color=GREY, linewidth=0.8, zorder=1)
+    for kind, colour in zip(np.unique(rows.explosive), CYCLE, strict=False):
+        own = rows.explosive == kind
+        axis.scatter(truth[own], predicted[own], s=5, linewidths=0, alpha=0.6, color=colour,
+                     label=_words(str(kind)), rasterized=True)  # fmt: skip
+    figures = rows.scores[target]
+    axis.text(
+        0.98, 0.04, f"R² {figures['r2']:.5f}\n95 % within {figures['relative_error_95']:.2%}",
+        transform=axis.transAxes, ha="right", va="bottom", fontsize=8,
+    )  # fmt: skip
+    letter = "c) " if target == "burden_velocity" else ""
+    axis.set(
+        title=f"{letter}{_words(target)[0].upper()}{_words(target)[1:]}",
+        xlabel=f"simulated [{variable.shown_unit}]",
+        ylabel=f"predicted [{variable.shown_unit}]",
+        aspect="equal",
+    )
+    axis.legend(loc="upper left", markerscale=3, fontsize=7)
+
+
+def _draw_by_explosive(axis: Any, rows: HeldOutRows, marks: Mapping[str, float]) -> None:
+    kinds, targets = sorted(rows.by_explosive), list(rows.truth)
+    height = 0.8 / len(kinds)
+    for k, (kind, colour) in enumerate(zip(kinds, CYCLE, strict=False)):
+        values = [100.0 * rows.by_explosive[kind][name]["relative_error_95"] for name in targets]
+        places = np.arange(len(targets)) + (k - (len(kinds) - 1) / 2) * height
+        axis.barh(places, values, height=0.9 * height, color=colour, label=_words(kind))
+    axis.axvline(100.0 * marks["relative_error_95"], color=ORANGE, linewidth=1.4)
+    axis.set_yticks(range(len(targets)), [_words(t).replace(" ", "\n", 1) for t in targets])
+    axis.invert_yaxis()
+    axis.grid(visible=False, axis="y")
+    axis.set(title="d) By target and explosive, test rows", xlabel="95 % of errors below [%]")
+    axis.legend(fontsize=7)
