@@ -101,7 +101,7 @@ def _reports(client: Any, tasks: list[ShardTask]) -> Iterator[ShardReport]:
         futures[future.key] = task
         return future
 
-    waiting = as_completed([submit(task) for task in tasks])
+    waiting = as_completed([submit(task) for task in tasks], loop=client.loop)
     for future in waiting:
         if future.status == "finished":
             report = future.result()

@@ -116,8 +116,8 @@ def _collection(dataset: xr.Dataset) -> str:
     )
     return (
         f"{attributes['design_method']} (seed {attributes['design_seed']}): {drawn} designs drawn "
-        f"for {size} possible ones ({size / drawn:.1%} accepted). SHA-256 of the recipe `{recipe}`, "
-        f"of the physics `{physics}`, of the content `{content}`."
+        f"for {size} possible ones ({size / drawn:.1%} accepted). SHA-256: recipe `{recipe}`, "
+        f"physics `{physics}`, content `{content}`."
     )
 
 
