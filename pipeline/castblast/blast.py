@@ -141,7 +141,7 @@ def design_faults(values: Mapping[str, float]) -> list[str]:
             f"{_show('charge_length', charge)} do not fit a bench_height of "
             f"{_show('bench_height', height)}: their sum must not exceed it"
         )
-    if stemming < -_ROUND_OFF * height:
+    if stemming < 0.0:
         faults.append(
             f"charge_length {_show('charge_length', charge)} leaves no room for stemming: at most "
             f"the bench_height of {_show('bench_height', height)}"
@@ -242,7 +242,8 @@ def _fill_design(values: Mapping[str, float]) -> dict[str, float]:
     if "charge_length" not in full:
         full.setdefault("stemming_length", STEMMING_RATIO * full["burden"])
         full["charge_length"] = full["bench_height"] - full["stemming_length"]
-    full.setdefault("stemming_length", full["bench_height"] - full["charge_length"])
+    room = full["bench_height"] - full["charge_length"]
+    full.setdefault("stemming_length", 0.0 if abs(room) <= _ROUND_OFF * full["bench_height"] else room)
     return full
 
 

@@ -95,7 +95,7 @@ def _event_value(b: Balance, ejection: bool, p: float, state: FloatArray) -> flo
     drives the burden over the force of the open air.
     """
     if ejection:
-        return 1.0 - state[PLUG_DISPLACEMENT] / b.stemming_length
+        return float(1.0 - state[PLUG_DISPLACEMENT] / b.stemming_length)
     area = loaded_area(b, state[DISPLACEMENT])
     force = (p - _END_PRESSURE) * area - b.friction_force
     return force / (ATMOSPHERIC_PRESSURE * area)

@@ -24,7 +24,7 @@ from castblast.kernel import kernel
 HISTORY_POINTS: Final = 64
 #: Limit of time in units of mean burden over the velocity that all gas energy would give; a run
 #: ends by itself after about one unit.
-_TIME_LIMIT: Final = 50.0
+_TIME_LIMIT: Final = 500.0
 #: Below this pressure [Pa] the products are close to an ideal gas of constant exponent, so that a
 #: tabulated isentrope may be continued with its last slope however far.
 _NEAR_IDEAL_PRESSURE: Final = 5e6

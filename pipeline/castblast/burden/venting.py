@@ -54,7 +54,7 @@ def friction_integral(pressure: float, density: float, exponent: float) -> float
         return 0.0
     ratio = ATMOSPHERIC_PRESSURE / pressure
     share = 1.0 - ratio ** ((exponent + 1.0) / exponent)
-    return pressure * density * exponent / (exponent + 1.0) * share
+    return float(pressure * density * exponent / (exponent + 1.0) * share)
 
 
 @kernel
