@@ -19,7 +19,7 @@ BLUE, ORANGE, GREEN, RED, PURPLE, SKY, YELLOW, GREY = (
 )  # fmt: skip
 CYCLE = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY)
 
-_STYLE = {
+_STYLE: Any = {
     "font.size": 9,
     "axes.titlesize": 10,
     "axes.titleweight": "bold",
@@ -35,6 +35,9 @@ _STYLE = {
     "lines.linewidth": 1.6,
     "figure.facecolor": "white",
 }
+
+#: Decorator of drawing functions: titles and legends take the style when they are made.
+in_style = rc_context(_STYLE)
 
 
 def new_figure(

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.report.style import CYCLE, GREY, ORANGE, new_figure, save_figure
+from castblast.report.style import BLUE, CYCLE, GREY, in_style, new_figure, save_figure
 from castblast.variables import VARIABLES
 
 Floats = NDArray[np.float64]
+_MARK = {"color": "#222222", "linestyle": "--", "linewidth": 1.0}
+_PLATE = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
+_OTHER_TARGETS = (("s", "-"), ("^", "--"), ("D", "-."), ("v", ":"))
 
 
 @dataclass(frozen=True)
@@ -60,6 +64,7 @@ class HeldOutRows:
             return np.asarray(100.0 * (self.predicted[target] - truth) / np.abs(truth))
 
 
+@in_style
 def draw_figure_two(
     path: Path,
     title: str,
@@ -85,7 +90,7 @@ def draw_figure_two(
     marks : mapping
         Published ``relative_error_95`` (fraction), ``r2`` and ``runs``.
     """
-    figure, axes = new_figure(2, 2, width=9.4, height=7.4)
+    figure, axes = new_figure(2, 2, width=9.4, height=7.6)
     _draw_learning(axes[0, 0], lines, target, marks)
     _draw_histogram(axes[0, 1], rows, target, marks)
     _draw_parity(axes[1, 0], rows, target)
@@ -94,6 +99,7 @@ def draw_figure_two(
     return save_figure(figure, path)
 
 
+@in_style
 def draw_parity(path: Path, title: str, rows: HeldOutRows) -> Path:
     """Draw predicted against actual for every target on the test rows."""
     targets = list(rows.truth)
@@ -115,32 +121,35 @@ def _words(name: str) -> str:
 def _draw_learning(
     axis: Any, lines: Sequence[LearningLine], target: str, marks: Mapping[str, float]
 ) -> None:
-    for line, colour in zip(lines, CYCLE, strict=False):
-        main = line.target == target
-        style = {"color": colour, "marker": "o", "markersize": 4 if main else 2.5}
-        width = 2.0 if main else 1.0
-        test = 100.0 * np.asarray(line.test, dtype=float)
-        axis.loglog(line.rows, test, label=_words(line.target), linewidth=width, **style)
-        if main:
-            train = 100.0 * np.asarray(line.train, dtype=float)
-            axis.loglog(
-                line.rows, train, ":", color=colour, linewidth=1.2, label="   training rows"
-            )
+    main = next(line for line in lines if line.target == target)
+    others = [line for line in lines if line is not main]
+    axis.loglog(main.rows, _percent(main.test), "o-", color=BLUE, linewidth=2.2, zorder=4,
+                label=_words(target))  # fmt: skip
+    axis.loglog(main.rows, _percent(main.train), ":", color=BLUE, linewidth=1.2, zorder=4,
+                label=f"{_words(target)}, training rows")  # fmt: skip
+    for line, (marker, dash) in zip(others, _OTHER_TARGETS, strict=False):
+        axis.loglog(line.rows, _percent(line.test), color=GREY, marker=marker, markersize=3.5,
+                    linestyle=dash, linewidth=1.0, label=_words(line.target))  # fmt: skip
     mark = 100.0 * marks["relative_error_95"]
-    axis.plot(
-        marks["runs"], mark, "*", markersize=12, color=ORANGE, markeredgecolor="black",
-        markeredgewidth=0.5, linestyle="none", label=f"paper, velocity: {mark:g} %", zorder=5,
-    )  # fmt: skip
+    axis.plot(marks["runs"], mark, "*", markersize=11, color="#222222", linestyle="none", zorder=5,
+              label=f"{_words(target)}, as published: {mark:g} %")  # fmt: skip
     axis.set(
         title="a) Learning curve, test rows",
         xlabel="training rows",
-        ylabel="95 % of errors below [%]",
+        ylabel="95 % of relative errors below [%]",
     )
-    _plain_log_ticks(axis.yaxis)
-    sizes = sorted({size for line in lines for size in line.rows})
-    axis.set_xticks(sizes, [f"{size:,}" for size in sizes], rotation=30)
+    sizes = sorted({*main.rows, int(marks["runs"])})
+    apart = [a for a, b in pairwise(sizes) if b / a > 1.45] + [sizes[-1]]
+    axis.set_xticks(apart, [f"{size:,}" for size in apart])
     axis.minorticks_off()
-    axis.legend(fontsize=7)
+    _plain_log_ticks(axis.yaxis)
+    axis.legend(fontsize=7, loc="lower left", bbox_to_anchor=(0.0, 0.0))
+    low, high = axis.get_ylim()
+    axis.set_ylim(low / (high / low) ** 0.6, high)  # room for the legend
+
+
+def _percent(fractions: Sequence[float]) -> Floats:
+    return 100.0 * np.asarray(fractions, dtype=np.float64)
 
 
 def _plain_log_ticks(axis: Any) -> None:
@@ -156,12 +165,13 @@ def _draw_histogram(axis: Any, rows: HeldOutRows, target: str, marks: Mapping[st
     reach = max(1.6 * mark, 150.0 * rows.scores[target]["relative_error_95"])
     inside = float(np.mean(np.abs(errors) <= mark))
     clipped = np.clip(errors, -reach, reach)
-    axis.hist(clipped, bins=np.linspace(-reach, reach, 61), color=CYCLE[0])
+    bins = min(60, max(20, 2 * round(len(errors) ** 0.5)))
+    axis.hist(clipped, bins=np.linspace(-reach, reach, bins + 1), color=BLUE)
     for side in (-mark, mark):
-        axis.axvline(side, color=ORANGE, linewidth=1.4)
+        axis.axvline(side, **_MARK)
     axis.text(
         0.98, 0.96, f"{inside:.1%} of {len(errors):,} rows\nwithin ±{mark:g} %",
-        transform=axis.transAxes, ha="right", va="top", fontsize=8,
+        transform=axis.transAxes, ha="right", va="top", fontsize=8, bbox=_PLATE,
     )  # fmt: skip
     axis.set(
         title=f"b) Error of {_words(target)}, test rows",
@@ -201,10 +211,12 @@ def _draw_by_explosive(axis: Any, rows: HeldOutRows, marks: Mapping[str, float])
     for k, (kind, colour) in enumerate(zip(kinds, CYCLE, strict=False)):
         values = [100.0 * rows.by_explosive[kind][name]["relative_error_95"] for name in targets]
         places = np.arange(len(targets)) + (k - (len(kinds) - 1) / 2) * height
-        axis.barh(places, values, height=0.9 * height, color=colour, label=_words(kind))
-    axis.axvline(100.0 * marks["relative_error_95"], color=ORANGE, linewidth=1.4)
+        axis.barh(places, values, height=0.9 * height, color=colour)
+    axis.axvline(100.0 * marks["relative_error_95"], **_MARK)
     axis.set_yticks(range(len(targets)), [_words(t).replace(" ", "\n", 1) for t in targets])
     axis.invert_yaxis()
     axis.grid(visible=False, axis="y")
-    axis.set(title="d) By target and explosive, test rows", xlabel="95 % of errors below [%]")
-    axis.legend(fontsize=7)
+    axis.set(
+        title="d) By target and explosive (colours of c), test rows",
+        xlabel="95 % of relative errors below [%]",
+    )
