@@ -303,8 +303,8 @@ def _grow(
 ) -> tuple[Vector, float, bool]:
     """Let a spring force grow by -stiffness rate dt up to `limit`.
 
-    Returns the force, the slip work [J] and whether it slips. The slip work is the mean of the force before and after, times the path that the spring did
-    not take up.
+    Returns the force, the slip work [J] and whether it slips. The work is the mean of the force
+    before and after, times the path that the spring did not take up.
     """
     x = force[0] - stiffness * step * rate[0]
     y = force[1] - stiffness * step * rate[1]

@@ -15,7 +15,6 @@ from math import sqrt
 
 import numpy as np
 from numba import prange
-from numpy.typing import NDArray
 
 from castblast.kernel import kernel, parallel_kernel
 from castblast.muckpile.contact import (
@@ -245,7 +244,7 @@ def _pass_balls(
                 off = _start(balls, i, gravity, step, elapsed)
                 # A state that is not finite counts as far off.
                 if not off <= largest:
-                    largest = off
+                    largest = off if off == off else np.inf
     return largest
 
 

@@ -294,30 +294,42 @@ def carry_memory(
         The partners are walls.
     """
     for i in prange(len(new.start) - 1):
-        a = old_index[i]
-        for p in range(new.start[i], new.start[i + 1]):
-            j = new.partner[p]
-            mass = balls.motion[i, 6]
-            if with_walls:
-                kn = wall_stiffness(balls.place[i, 3], modulus)
-                first, second = a, np.int64(j)
-            else:
-                kn = ball_stiffness(balls.place[i, 3], balls.place[j, 3], modulus)
-                mass = mass * balls.motion[j, 6] / (mass + balls.motion[j, 6])
-                b = old_index[j]
-                first, second = min(a, b), max(a, b)
-            for word in range(ROW - 2):
-                new.memory[p, word] = 0.0
-            new.memory[p, 6] = kn
-            new.memory[p, 7] = 2.0 * np.sqrt(mass * kn)
-            new.touching[p] = 0
-            for q in range(old.start[first], old.start[first + 1]):
-                if old.partner[q] == second:
-                    if old.touching[q]:
-                        # The memory is what the first does to the second.
-                        sign = 1.0 if first == a else -1.0
-                        _copy_row(new, p, old, q, sign)
-                    break
+        _carry_ball(balls, new, old, old_index, modulus, with_walls, i)
+
+
+@kernel
+def _carry_ball(
+    balls: Balls,
+    new: Contacts,
+    old: Contacts,
+    old_index: IntArray,
+    modulus: float,
+    with_walls: bool,
+    i: int,
+) -> None:
+    """Do the work of `carry_memory` for the contacts of ball `i`."""
+    a = old_index[i]
+    for p in range(new.start[i], new.start[i + 1]):
+        j = np.int64(new.partner[p])
+        mass = balls.motion[i, 6]
+        if with_walls:
+            kn = wall_stiffness(balls.place[i, 3], modulus)
+            first, second = a, j
+        else:
+            kn = ball_stiffness(balls.place[i, 3], balls.place[j, 3], modulus)
+            mass = mass * balls.motion[j, 6] / (mass + balls.motion[j, 6])
+            first, second = min(a, old_index[j]), max(a, old_index[j])
+        for word in range(ROW - 2):
+            new.memory[p, word] = 0.0
+        new.memory[p, 6] = kn
+        new.memory[p, 7] = 2.0 * np.sqrt(mass * kn)
+        new.touching[p] = 0
+        for q in range(old.start[first], old.start[first + 1]):
+            if old.partner[q] == second:
+                if old.touching[q]:
+                    # The memory is what the first does to the second.
+                    _copy_row(new, p, old, q, 1.0 if first == a else -1.0)
+                break
 
 
 @kernel

@@ -1,0 +1,416 @@
+"""The cast: blocks are thrown at their delays, fly, collide and come to rest as a muckpile.
+
+At its firing time every ball of a block receives the velocity of the block; from then on only
+gravity and contacts act. Left out: air drag, the gas that still flows through the rock, and
+breakage in flight. The run ends when the translational kinetic energy has stayed below a share of
+its maximum for a while after the last firing; spins are not asked, because the contact law does
+not stop a ball that spins about its contact normal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf, log, nan
+from time import perf_counter
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from castblast.errors import Status
+from castblast.muckpile.contact import ContactLaw
+from castblast.muckpile.particles import (
+    FloatArray,
+    IntArray,
+    Particles,
+    centre_of_mass,
+    potential_energy,
+    rotational_energy,
+    translational_energy,
+)
+from castblast.muckpile.simulation import Simulation
+from castblast.muckpile.threads import thread_count
+from castblast.muckpile.walls import Walls
+from castblast.progress import ProgressCallback, silent
+
+#: Called with the simulated time [s] and a copy of the state.
+SnapshotCallback: TypeAlias = Callable[[float, Particles], None]
+
+
+class CastCase(NamedTuple):
+    """Everything a cast needs.
+
+    Attributes
+    ----------
+    particles : Particles
+        At rest, or moving if they belong to no block.
+    law : ContactLaw
+    walls : Walls
+    block_delay : array (b,) [s]
+        Firing time of each block; infinite: never fired.
+    block_velocity : array (b, 3) [m s-1]
+        Velocity that the balls of the block receive.
+    gravity : float [m s-2]
+    hold_unfired : bool
+        Blocks stand as intact rock until they are fired; False: they are loose from the start.
+    max_time, min_time : float [s]
+        The run ends between them.
+    stop_energy_ratio : float [-]
+        Share of the largest translational energy below which the pile is at rest ...
+    stop_duration : float [s]
+        ... once it has stayed there so long.
+    step_safety : float [-]
+        Share of the stable step that is used.
+    time_step : float [s]
+        A fixed step; 0: by the rule, checked at each renewal of the lists.
+    skin : float [m]
+        Of the pair lists; 0: by the rule. Results do not depend on it but for rounding.
+    ballistic : bool
+        Pair lists along the paths of flight. Results do not depend on it but for rounding.
+    threads : int
+        0: all. Results do not depend on it, to the last bit.
+    keep_ledger : bool
+        Record dissipated energies; costs a few per cent of the time.
+    sample_interval : float [s]
+        Of the history and of the test for rest.
+    snapshot_interval : float [s]
+        0: only the first and the last state.
+    """
+
+    particles: Particles
+    law: ContactLaw
+    walls: Walls
+    block_delay: FloatArray
+    block_velocity: FloatArray
+    gravity: float = 9.81
+    hold_unfired: bool = True
+    max_time: float = 30.0
+    min_time: float = 0.0
+    stop_energy_ratio: float = 1e-4
+    stop_duration: float = 0.2
+    step_safety: float = 0.8
+    time_step: float = 0.0
+    skin: float = 0.0
+    ballistic: bool = True
+    threads: int = 0
+    keep_ledger: bool = True
+    sample_interval: float = 0.02
+    snapshot_interval: float = 0.0
+
+
+class CastHistory(NamedTuple):
+    """The run over time, k samples.
+
+    Attributes
+    ----------
+    time : array (k,) [s]
+    translational_energy, rotational_energy : array (k,) [J]
+    centre_of_mass : array (k, 3) [m]
+    contacts : array (k,), int64
+        Between balls.
+    """
+
+    time: FloatArray
+    translational_energy: FloatArray
+    rotational_energy: FloatArray
+    centre_of_mass: FloatArray
+    contacts: IntArray
+
+
+class EnergyLedger(NamedTuple):
+    """Where the energy went; all in J but the residual.
+
+    Attributes
+    ----------
+    initial : float
+        Kinetic, potential and elastic energy at the start.
+    fired : float
+        Kinetic energy added by the firing of blocks.
+    kinetic, potential, spring : float
+        At the end.
+    slip, rolling_slip, dashpot : float
+        Dissipated on the way; NaN when not recorded.
+    residual : float [-]
+        Open balance over the largest of: energy put in by firing, potential energy released, and
+        kinetic energy at the start.
+    """
+
+    initial: float
+    fired: float
+    kinetic: float
+    potential: float
+    spring: float
+    slip: float
+    rolling_slip: float
+    dashpot: float
+    residual: float
+
+
+class CastCounters(NamedTuple):
+    """What the run cost and how close it came to its limits.
+
+    Attributes
+    ----------
+    steps, rebuilds, particle_steps : int
+    smallest_step, largest_step : float [s]
+        Of the stable step by the rule, over the run.
+    largest_overlap : float [-]
+        Over the radius of the smaller ball, among the samples.
+    seconds : float [s]
+        Wall time, with compilation if there was any.
+    """
+
+    steps: int
+    rebuilds: int
+    particle_steps: int
+    smallest_step: float
+    largest_step: float
+    largest_overlap: float
+    seconds: float
+
+
+class CastResult(NamedTuple):
+    """Outcome of a cast.
+
+    Attributes
+    ----------
+    particles : Particles
+        Final state, in the order of the case.
+    time : float [s]
+    status : Status
+        OK: at rest; NOT_CONVERGED: `max_time` was reached first; UNSTABLE_STEP: not finite.
+    failed_ball : int
+        First ball with a state that is not finite; -1: none.
+    failed_time : float [s]
+        When that was noticed; NaN: never.
+    history : CastHistory
+    ledger : EnergyLedger
+    counters : CastCounters
+    """
+
+    particles: Particles
+    time: float
+    status: Status
+    failed_ball: int
+    failed_time: float
+    history: CastHistory
+    ledger: EnergyLedger
+    counters: CastCounters
+
+
+class _Record:
+    """Samples of a run and what they say about rest."""
+
+    def __init__(self, case: CastCase) -> None:
+        self.case = case
+        self.rows: list[tuple[float, float, float, float, float, float, int]] = []
+        self.largest_energy = 0.0
+        self.largest_overlap = 0.0
+        self.quiet_since = inf
+
+    def add(self, run: Simulation) -> Particles:
+        """Take a sample."""
+        state = run.state()
+        density = self.case.law.density
+        moving = translational_energy(state, density)
+        _, overlap, contacts = run.survey()
+        centre = centre_of_mass(state)
+        self.rows.append(
+            (run.clock, moving, rotational_energy(state, density), *map(float, centre), contacts)
+        )
+        self.largest_energy = max(self.largest_energy, moving)
+        self.largest_overlap = max(self.largest_overlap, overlap)
+        if moving >= self.case.stop_energy_ratio * self.largest_energy:
+            self.quiet_since = inf
+        elif self.quiet_since == inf:
+            self.quiet_since = run.clock
+        return state
+
+    def at_rest(self, last_firing: float) -> bool:
+        """Whether the last sample ends a long enough time of rest."""
+        now = self.rows[-1][0]
+        since = max(self.quiet_since, last_firing)
+        return now >= self.case.min_time and now - since >= self.case.stop_duration
+
+    def share(self, last_firing: float) -> float:
+        """Estimate the finished share of the run for people: mostly how far energy has fallen."""
+        now, moving = self.rows[-1][0], self.rows[-1][1]
+        if now <= last_firing or not 0.0 < moving < self.largest_energy:
+            return min(0.1, 0.1 * now / max(last_firing, 1e-9))
+        decay = log(self.largest_energy / moving) / -log(self.case.stop_energy_ratio)
+        return min(0.99, max(0.1 + 0.89 * decay, now / self.case.max_time))
+
+    def history(self) -> CastHistory:
+        """Return the samples as arrays."""
+        table = np.array([row[:6] for row in self.rows], dtype=np.float64)
+        contacts = np.array([row[6] for row in self.rows], dtype=np.int64)
+        columns = (np.ascontiguousarray(table[:, k]) for k in range(3))
+        return CastHistory(*columns, np.ascontiguousarray(table[:, 3:6]), contacts)
+
+
+def check_case(case: CastCase) -> list[str]:
+    """Return every fault in the sizes and values of `case`, in words; empty: none."""
+    faults = []
+    blocks = len(case.block_delay)
+    if case.block_velocity.shape != (blocks, 3):
+        faults.append(
+            f"block_velocity has the shape {case.block_velocity.shape}, "
+            f"block_delay asks for ({blocks}, 3)"
+        )
+    if len(case.particles.block) and case.particles.block.max() >= blocks:
+        faults.append(
+            f"a ball belongs to block {case.particles.block.max()}, but there are {blocks} blocks"
+        )
+    if np.isnan(case.block_delay).any() or (case.block_delay < 0.0).any():
+        faults.append("block_delay: a firing time is negative or not a number")
+    if not 0.0 < case.step_safety < 1.0:
+        faults.append(f"step_safety = {case.step_safety:g}: must be above 0 and below 1")
+    return faults
+
+
+def run_cast(
+    case: CastCase,
+    progress: ProgressCallback = silent,
+    snapshot: SnapshotCallback | None = None,
+) -> CastResult:
+    """Simulate a cast from the first firing to rest.
+
+    Parameters
+    ----------
+    case : CastCase
+    progress : callable
+        Called at every sample.
+    snapshot : callable, optional
+        Called with the state at the start, every `snapshot_interval` and at the end. It changes
+        no number of the result.
+
+    Returns
+    -------
+    CastResult
+
+    Raises
+    ------
+    ValueError
+        The case contradicts itself; the message names every fault of `check_case`.
+    """
+    if faults := check_case(case):
+        raise ValueError("; ".join(faults))
+    began = perf_counter()
+    with thread_count(case.threads) as threads:
+        run = _make_run(case, threads)
+        return _run_to_rest(case, run, progress, snapshot, began)
+
+
+def _make_run(case: CastCase, threads: int) -> Simulation:
+    block = case.particles.block
+    held = (block >= 0) & case.hold_unfired
+    return Simulation(
+        case.particles,
+        case.law,
+        case.walls,
+        held,
+        gravity=case.gravity,
+        step_safety=case.step_safety,
+        time_step=case.time_step,
+        skin=case.skin,
+        ballistic=case.ballistic,
+        threads=threads,
+        keep_ledger=case.keep_ledger,
+    )
+
+
+def _run_to_rest(
+    case: CastCase,
+    run: Simulation,
+    progress: ProgressCallback,
+    snapshot: SnapshotCallback | None,
+    began: float,
+) -> CastResult:
+    record = _Record(case)
+    state = record.add(run)
+    initial = _mechanical_energy(case, run)
+    firings = np.unique(case.block_delay[case.block_delay < case.max_time])
+    last_firing = float(firings[-1]) if len(firings) else 0.0
+    next_sample = case.sample_interval
+    next_picture = case.snapshot_interval or inf
+    fired, status = 0.0, Status.NOT_CONVERGED
+    if snapshot:
+        snapshot(0.0, state)
+    while run.clock < case.max_time:
+        if len(firings) and run.clock >= firings[0]:
+            fired += _fire(case, run, float(firings[0]))
+            firings = firings[1:]
+        event = min(float(firings[0]), case.max_time) if len(firings) else case.max_time
+        if run.clock < event and not run.run(min(next_sample, next_picture), event):
+            status = Status.UNSTABLE_STEP
+            break
+        if run.clock >= next_sample:
+            state = record.add(run)
+            next_sample += case.sample_interval
+            progress(record.share(last_firing), _line(record))
+            if not len(firings) and record.at_rest(last_firing):
+                status = Status.OK
+                break
+        if run.clock >= next_picture:
+            next_picture += case.snapshot_interval
+            if snapshot:
+                snapshot(run.clock, run.state())
+    state = run.state()
+    if snapshot and status != Status.UNSTABLE_STEP:
+        snapshot(run.clock, state)
+    progress(1.0, _line(record))
+    return CastResult(
+        state,
+        run.clock,
+        status,
+        run.failed_ball,
+        run.clock if run.failed else nan,
+        record.history(),
+        _close_ledger(case, run, initial, fired),
+        CastCounters(
+            run.steps,
+            run.rebuilds,
+            run.steps * len(state.radius),
+            run.smallest_step,
+            run.largest_step,
+            record.largest_overlap,
+            perf_counter() - began,
+        ),
+    )
+
+
+def _line(record: _Record) -> str:
+    now, moving = record.rows[-1][0], record.rows[-1][1]
+    ratio = moving / record.largest_energy if record.largest_energy > 0.0 else 0.0
+    return f"t = {now:.2f} s, kinetic energy {100.0 * ratio:.3g} % of its maximum"
+
+
+def _fire(case: CastCase, run: Simulation, time: float) -> float:
+    """Give the blocks due at `time` their velocity; return the kinetic energy added [J]."""
+    due = np.flatnonzero(case.block_delay == time)
+    block = case.particles.block
+    chosen = np.isin(block, due)
+    before = run.translational_energy()
+    velocity = np.zeros((len(block), 3))
+    velocity[chosen] = case.block_velocity[block[chosen]]
+    run.fire(chosen, velocity)
+    return run.translational_energy() - before
+
+
+def _mechanical_energy(case: CastCase, run: Simulation) -> tuple[float, float, float]:
+    """Kinetic, potential and elastic energy [J] of the present state."""
+    state, density = run.state(), case.law.density
+    kinetic = translational_energy(state, density) + rotational_energy(state, density)
+    return kinetic, potential_energy(state, density, case.gravity), run.survey()[0]
+
+
+def _close_ledger(
+    case: CastCase, run: Simulation, initial: tuple[float, float, float], fired: float
+) -> EnergyLedger:
+    kinetic, potential, spring = _mechanical_energy(case, run)
+    spent = run.dissipated if case.keep_ledger else np.full(3, nan)
+    before = sum(initial)
+    open_balance = before + fired - kinetic - potential - spring - float(spent.sum())
+    scale = max(abs(fired), abs(initial[1] - potential), initial[0], 1e-300)
+    return EnergyLedger(
+        before, fired, kinetic, potential, spring, *map(float, spent), open_balance / scale
+    )
