@@ -20,20 +20,19 @@ def demo(
     restart: Annotated[bool, typer.Option("--restart", help="Discard earlier results.")] = False,
 ) -> Mapping[str, Any]:
     """Dataset, surrogate, export, prediction and muckpile; a second run reuses what is valid."""
-    from castblast.stages.demo import STEPS, run_demo
+    from castblast.stages.demo import STEPS, make_demo, next_commands, summarise
 
-    screen.note("The first run compiles the kernels once; that takes about a minute.")
-    outcome = None
-    for step in STEPS:
-        with screen.progress(f"{step.number}/{len(STEPS)} {step.title}") as progress:
-            outcome = run_demo(step, out, workers=workers, restart=restart, progress=progress)
-        for line in outcome.lines:
-            screen.say(f"   {line}")
-    assert outcome is not None
+    job = make_demo(out, workers=workers, restart=restart)
+    screen.note("The first run compiles the kernels; that takes about a minute.")
+    for number, step in enumerate(STEPS, start=1):
+        with screen.progress(f"{number}/{len(STEPS)} {step.title}") as progress:
+            lines = step.run(job, progress)
+        for line in lines:
+            screen.say(f"    {line}")
     screen.say("\nTry next:")
-    for line in outcome.next_commands:
-        screen.say(f"   {line}")
-    return outcome.document
+    for line in next_commands(job):
+        screen.say(f"    {line}")
+    return summarise(job)
 
 
 def add_to(app: typer.Typer) -> None:

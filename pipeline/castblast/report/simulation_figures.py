@@ -17,6 +17,7 @@ from castblast.report.style import (
     PURPLE,
     RED,
     SKY,
+    in_style,
     new_figure,
     save_figure,
 )
@@ -56,6 +57,7 @@ _LEDGER = (
 )
 
 
+@in_style
 def draw_simulation(
     path: Path, document: Mapping[str, Any], near: NearFieldHistory, burden: BurdenHistory
 ) -> Path:
@@ -76,7 +78,7 @@ def draw_simulation(
     _draw_burden(axes[1, 0], burden)
     _draw_ledger(axes[1, 1], document)
     figure.suptitle(
-        f"{document['explosive']}: equilibrium at {document['equilibrium_pressure'] * 1e-6:.0f} MPa, "
+        f"{document['explosive']}: {document['equilibrium_pressure'] * 1e-6:.0f} MPa at rest, "
         f"burden velocity {document['burden_velocity']:.1f} m/s",
         fontsize=11,
     )
@@ -116,12 +118,14 @@ def _draw_burden(axis: Any, burden: BurdenHistory) -> None:
 def _draw_ledger(axis: Any, document: Mapping[str, Any]) -> None:
     total = document["gas_work"]
     shares = [(label, document[name] / total * 100.0, colour) for name, label, colour in _LEDGER]
+    # A negative share is the rounding of a ledger that has nothing to book there.
+    shares = [(label, max(share, 0.0), colour) for label, share, colour in shares]
     shares.sort(key=lambda item: item[1])
     bars = axis.barh([s[0] for s in shares], [s[1] for s in shares], color=[s[2] for s in shares])
     axis.bar_label(bars, fmt="%.1f %%", padding=3, fontsize=8)
     axis.set_xlim(right=max(s[1] for s in shares) * 1.2)
     axis.grid(visible=False, axis="y")
     axis.set(
-        title=f"Where the gas work goes ({total * 1e-6:.2f} MJ per metre of hole)",
+        title=f"Where {total * 1e-6:.1f} MJ/m of gas work go",
         xlabel="share of the gas work [%]",
     )

@@ -1,0 +1,51 @@
+"""Surrogate and physics side by side: burden velocity over the burden."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from castblast.report.style import CYCLE, in_style, new_figure, save_figure
+
+
+@dataclass(frozen=True)
+class VelocityCurve:
+    """Burden velocity over burden for one design.
+
+    Attributes
+    ----------
+    label : str
+    burden, velocity, band : array (n,) [m, m s-1, m s-1]
+        Answers of the surrogate and the half-widths of their 95 % bands.
+    simulated_burden, simulated_velocity : array (k,) [m, m s-1]
+        The physics at a few burdens.
+    """
+
+    label: str
+    burden: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    band: NDArray[np.float64]
+    simulated_burden: NDArray[np.float64]
+    simulated_velocity: NDArray[np.float64]
+
+
+@in_style
+def draw_velocity_curves(path: Path, title: str, curves: Sequence[VelocityCurve]) -> Path:
+    """Draw lines with bands for the surrogate and dots for the physics; logarithmic axes."""
+    figure, axis = new_figure(width=7.0, height=4.0)
+    for curve, colour in zip(curves, CYCLE, strict=False):
+        low, high = curve.velocity - curve.band, curve.velocity + curve.band
+        axis.fill_between(curve.burden, low, high, color=colour, alpha=0.2, linewidth=0)
+        axis.plot(curve.burden, curve.velocity, color=colour, label=curve.label)
+        axis.plot(curve.simulated_burden, curve.simulated_velocity, "o", color=colour, markersize=4)
+    axis.set_yscale("log")
+    axis.yaxis.set_major_formatter("{x:g}")
+    axis.yaxis.set_minor_formatter("{x:g}")
+    axis.plot([], [], "o", color="#222222", markersize=4, label="physics")
+    axis.set(title=title, xlabel="burden [m]", ylabel="burden velocity [m/s]")
+    axis.legend()
+    return save_figure(figure, path)
