@@ -1,7 +1,6 @@
 """`castblast muckpile`: throw a bench with the discrete-element model."""
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -13,7 +12,9 @@ from castblast.cli.verb import verb
 
 def muckpile(
     screen: Screen,
-    bench: Annotated[Path, typer.Argument(help="Bench file (YAML).")],
+    bench: Annotated[
+        str, typer.Argument(help="Bench file (YAML), or the name of one that comes with castblast.")
+    ],
     out: OutFolder = None,
     balls: Annotated[
         int | None,
