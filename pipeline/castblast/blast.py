@@ -230,8 +230,10 @@ def result_values(result: BlastResult) -> dict[str, float]:
     """Every output of `variables.OUTPUTS` by name, SI; all NaN if the run failed."""
     if result.status != Status.OK:
         return dict.fromkeys(OUTPUT_NAMES, nan)
-    parts = result.near_field._asdict() | result.burden._asdict()
-    return {name: float(parts[name]) for name in OUTPUT_NAMES}
+    near, burden = result.near_field, result.burden
+    return {
+        name: float(getattr(near if hasattr(near, name) else burden, name)) for name in OUTPUT_NAMES
+    }
 
 
 def _fill_design(values: Mapping[str, float]) -> dict[str, float]:
@@ -243,7 +245,9 @@ def _fill_design(values: Mapping[str, float]) -> dict[str, float]:
         full.setdefault("stemming_length", STEMMING_RATIO * full["burden"])
         full["charge_length"] = full["bench_height"] - full["stemming_length"]
     room = full["bench_height"] - full["charge_length"]
-    full.setdefault("stemming_length", 0.0 if abs(room) <= _ROUND_OFF * full["bench_height"] else room)
+    full.setdefault(
+        "stemming_length", 0.0 if abs(room) <= _ROUND_OFF * full["bench_height"] else room
+    )
     return full
 
 

@@ -226,7 +226,7 @@ def test_floor_friction_above_the_push_holds_the_burden() -> None:
 def test_histories_run_from_the_near_field_to_the_open_air() -> None:
     result = solve_burden_motion(ANFO, BENCH, MODEL, 0.08)
     assert result.history_time[0] == 0.0
-    assert result.history_time[-1] == result.end_time
+    assert result.history_time[-1] == result.motion_time
     assert np.all(np.diff(result.history_pressure) < 0)
     assert np.all(np.diff(result.history_velocity) > 0)
     assert result.history_velocity[-1] == result.burden_velocity

@@ -203,7 +203,7 @@ class Reference:
             "vented_enthalpy": y[6],
             "acceleration_time": t95,
             "acceleration_distance": piece.sol(t95)[1],
-            "end_time": t,
+            "motion_time": t,
             "ejection_time": ejection,
         }
 
@@ -389,7 +389,7 @@ def test_velocity_does_not_know_the_scale() -> None:
             assert result.burden_velocity == pytest.approx(
                 results[0].burden_velocity, rel=tolerance
             )
-            for name in ("acceleration_time", "acceleration_distance", "end_time"):
+            for name in ("acceleration_time", "acceleration_distance", "motion_time"):
                 expected = s * getattr(results[0], name)
                 assert getattr(result, name) == pytest.approx(expected, rel=10 * tolerance)
 

@@ -111,7 +111,8 @@ class BurdenResult(NamedTuple):
         When the stemming has left the hole; inf if it stays.
     acceleration_time, acceleration_distance : float [s], [m]
         When and where the burden has 95 percent of its velocity; 0 if it does not move.
-    end_time : float [s]
+    motion_time : float [s]
+        When the gas stops pushing and the run ends.
     burden_kinetic_energy : float [J]
         Per hole, as all energies here.
     fracture_work : float [J]
@@ -144,7 +145,7 @@ class BurdenResult(NamedTuple):
     ejection_time: float
     acceleration_time: float
     acceleration_distance: float
-    end_time: float
+    motion_time: float
     burden_kinetic_energy: float
     fracture_work: float
     stemming_work: float

@@ -48,6 +48,23 @@ _STAGES = np.array(
 _ERROR = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
 
 
+class Path(NamedTuple):
+    """Path of the integrator.
+
+    Where the right-hand side jumps, one time appears twice, with the rates before and after.
+
+    Attributes
+    ----------
+    times : array (n,) [s]
+    states, slopes : arrays (n, 11)
+        State and its time derivative, SI units.
+    """
+
+    times: FloatArray
+    states: FloatArray
+    slopes: FloatArray
+
+
 class _Work(NamedTuple):
     """Arrays of the integrator: states at both ends of a step, rates of its stages, scales."""
 
@@ -138,14 +155,17 @@ def _locate(
 
 
 @kernel
+def _record(path: Path, point: int, time: float, work: _Work) -> int:
+    """Write the start of the next step into the path; return the next free row."""
+    path.times[point] = time
+    path.states[point] = work.state
+    path.slopes[point] = work.stages[0]
+    return point + 1
+
+
+@kernel
 def integrate(
-    b: Balance,
-    state: FloatArray,
-    scale: FloatArray,
-    time_limit: float,
-    times: FloatArray,
-    states: FloatArray,
-    slopes: FloatArray,
+    b: Balance, state: FloatArray, scale: FloatArray, time_limit: float, path: Path
 ) -> tuple[int, int, int, float]:
     """Integrate until the gas stops pushing the burden faster.
 
@@ -158,14 +178,13 @@ def integrate(
         Natural size of each state.
     time_limit : float [s]
         Without an end by then the run has not converged.
-    times, states, slopes : arrays (n,), (n, 11), (n, 11)
-        Filled with the path. Where the right-hand side jumps, one time appears twice, with the
-        rates before and after.
+    path : Path
+        Filled from row 0.
 
     Returns
     -------
     status, points, steps : int
-        Outcome, used rows of the arrays, accepted steps.
+        Outcome, used rows of the path, accepted steps.
     ejection_time : float [s]
         inf if the stemming stays.
     """
@@ -173,13 +192,13 @@ def integrate(
     venting = False
     plugged = b.stemming_length > 0.0
     ejection_time = np.inf if plugged else 0.0
-    time, points, steps = 0.0, 1, 0
+    time, steps = 0.0, 0
     p = rates(b, venting, plugged, time, state, work.stages[0])
-    times[0], states[0], slopes[0] = time, state, work.stages[0]
+    points = _record(path, 0, time, work)
     drive = _event_value(b, False, p, state)
     step = 1e-4 / np.max(np.abs(work.stages[0]) / (np.abs(state) + scale))
     while drive > _EVENT_TOLERANCE:
-        if points + 2 > times.size or time >= time_limit:
+        if points + 2 > path.times.size or time >= time_limit:
             return Status.NOT_CONVERGED.value, points, steps, ejection_time
         to_venting = b.venting_time - time
         starts = not venting and step >= to_venting
@@ -197,27 +216,24 @@ def integrate(
             starts = False
             length = _locate(b, False, venting, plugged, time, length, drive, new_drive, work)
             new_drive = 0.0
-        ejected = plugged and work.new_state[PLUG_DISPLACEMENT] >= b.stemming_length
+        after = _event_value(b, True, p, work.new_state) if plugged else 1.0
+        ejected = after <= 0.0
         if ejected:
             starts = False
             before = _event_value(b, True, p, state)
-            after = _event_value(b, True, p, work.new_state)
             length = _locate(b, True, venting, plugged, time, length, before, after, work)
-            new_drive = drive
+            ejection_time = time + length
         time = b.venting_time if starts else time + length
         steps += 1
         state[:] = work.new_state
         work.stages[0] = work.stages[6]
         drive = new_drive
-        times[points], states[points], slopes[points] = time, state, work.stages[0]
-        points += 1
+        points = _record(path, points, time, work)
         if ejected or starts:
             venting = venting or starts
             plugged = plugged and not ejected
-            ejection_time = time if ejected else ejection_time
             p = rates(b, venting, plugged, time, state, work.stages[0])
             drive = _event_value(b, False, p, state)
-            times[points], states[points], slopes[points] = time, state, work.stages[0]
-            points += 1
+            points = _record(path, points, time, work)
             step = min(step, length)
     return Status.OK.value, points, steps, ejection_time

@@ -19,6 +19,7 @@ from castblast.burden.balance import (
 )
 from castblast.burden.case import BurdenResult
 from castblast.burden.geometry import pressurised_section
+from castblast.burden.integrator import Path
 from castblast.burden.venting import ATMOSPHERIC_PRESSURE
 from castblast.errors import Status
 from castblast.explosive.isentrope import FloatArray, energy, pressure
@@ -36,9 +37,7 @@ def summarise(
     status: int,
     steps: int,
     ejection_time: float,
-    times: FloatArray,
-    states: FloatArray,
-    slopes: FloatArray,
+    path: Path,
     gas_energy: float,
     history_points: int,
 ) -> BurdenResult:
@@ -49,13 +48,13 @@ def summarise(
     b : Balance
     status, steps : int
     ejection_time : float [s]
-    times, states, slopes : arrays (n,), (n, 11), (n, 11)
-        Path of the integrator; a time may appear twice.
+    path : Path
+        Used rows only.
     gas_energy : float [J]
         Energy in the products at the start.
     history_points : int
     """
-    end, end_time = states[-1], times[-1]
+    end, end_time = path.states[-1], path.times[-1]
     velocity, displacement = end[VELOCITY], end[DISPLACEMENT]
     left = end[GAS_MASS] / b.explosive_density
     left *= energy(b.isentrope, relative_volume(b, end_time, end))
@@ -70,8 +69,8 @@ def summarise(
     vented = end[FRACTURE_MASS] + end[COLLAR_MASS]
     if status == Status.OK.value and not abs(residual) <= _LEDGER_TOLERANCE:
         status = Status.LEDGER_OPEN.value
-    time95, distance95 = _reach_velocity(_ACCELERATED * velocity, times, states, slopes)
-    history = _histories(b, times, states, slopes, history_points)
+    time95, distance95 = _reach_velocity(_ACCELERATED * velocity, path)
+    history = _histories(b, path, history_points)
     return BurdenResult(
         status,
         velocity,
@@ -102,55 +101,49 @@ def summarise(
 
 
 @kernel
-def _interpolate(
-    time: float, i: int, times: FloatArray, states: FloatArray, slopes: FloatArray, j: int
-) -> float:
+def _interpolate(time: float, i: int, path: Path, j: int) -> float:
     """Cubic Hermite value of state `j` at a time between points `i` and `i + 1`."""
-    h = times[i + 1] - times[i]
-    s = (time - times[i]) / h
-    y0, y1 = states[i, j], states[i + 1, j]
-    d0, d1 = slopes[i, j] * h, slopes[i + 1, j] * h
+    h = path.times[i + 1] - path.times[i]
+    s = (time - path.times[i]) / h
+    y0, y1 = path.states[i, j], path.states[i + 1, j]
+    d0, d1 = path.slopes[i, j] * h, path.slopes[i + 1, j] * h
     return float(
         y0 + s * (d0 + s * (3.0 * (y1 - y0) - 2.0 * d0 - d1 + s * (2.0 * (y0 - y1) + d0 + d1)))
     )
 
 
 @kernel
-def _reach_velocity(
-    velocity: float, times: FloatArray, states: FloatArray, slopes: FloatArray
-) -> tuple[float, float]:
+def _reach_velocity(velocity: float, path: Path) -> tuple[float, float]:
     """Time [s] and displacement [m] at which the burden first has a velocity; 0 if at rest."""
     if velocity <= 0.0:
         return 0.0, 0.0
     i = 0
-    while states[i + 1, VELOCITY] < velocity:
+    while path.states[i + 1, VELOCITY] < velocity:
         i += 1
-    low, high = times[i], times[i + 1]
+    low, high = path.times[i], path.times[i + 1]
     for _ in range(60):
         middle = 0.5 * (low + high)
-        if _interpolate(middle, i, times, states, slopes, VELOCITY) < velocity:
+        if _interpolate(middle, i, path, VELOCITY) < velocity:
             low = middle
         else:
             high = middle
-    return high, _interpolate(high, i, times, states, slopes, DISPLACEMENT)
+    return high, _interpolate(high, i, path, DISPLACEMENT)
 
 
 @kernel
-def _histories(
-    b: Balance, times: FloatArray, states: FloatArray, slopes: FloatArray, n: int
-) -> FloatArray:
+def _histories(b: Balance, path: Path, n: int) -> FloatArray:
     """Time, pressure, velocity and displacement, array (4, n); times crowd at the start."""
     history = np.empty((4, n))
     state = np.empty(STATE_SIZE)
-    last = times.size - 1
+    last = path.times.size - 1
     for j in range(n):
-        time = times[last] * (j / (n - 1)) ** 2
+        time = path.times[last] * (j / (n - 1)) ** 2
         if j == n - 1 or last == 0:
-            state[:] = states[last]
+            state[:] = path.states[last]
         else:
-            i = np.searchsorted(times, time, side="right") - 1
+            i = np.searchsorted(path.times, time, side="right") - 1
             for k in range(STATE_SIZE):
-                state[k] = _interpolate(time, i, times, states, slopes, k)
+                state[k] = _interpolate(time, i, path, k)
         history[0, j] = time
         history[1, j] = pressure(b.isentrope, relative_volume(b, time, state))
         history[2, j] = state[VELOCITY]

@@ -9,7 +9,7 @@ import numpy as np
 
 from castblast.burden import balance as bal
 from castblast.burden.case import BurdenGeometry, BurdenParameters, BurdenResult
-from castblast.burden.integrator import MAX_STEPS, integrate
+from castblast.burden.integrator import MAX_STEPS, Path, integrate
 from castblast.burden.ledger import summarise
 from castblast.errors import Status
 from castblast.explosive.isentrope import (
@@ -122,27 +122,19 @@ def _solve(
     scale[bal.PLUG_DISPLACEMENT] = max(b.stemming_length, b.hole_width)
     scale[bal.PLUG_VELOCITY] = np.sqrt(pressure(b.isentrope, volume) / b.stemming_density)
 
-    times = np.empty(MAX_STEPS)
-    states = np.empty((MAX_STEPS, bal.STATE_SIZE))
-    slopes = np.empty((MAX_STEPS, bal.STATE_SIZE))
+    path = Path(
+        np.empty(MAX_STEPS),
+        np.empty((MAX_STEPS, bal.STATE_SIZE)),
+        np.empty((MAX_STEPS, bal.STATE_SIZE)),
+    )
     status, points, steps, ejection_time = integrate(
-        b, state, scale, _TIME_LIMIT * b.path / fastest, times, states, slopes
+        b, state, scale, _TIME_LIMIT * b.path / fastest, path
     )
-    if status == Status.OK.value and _leaves_table(
-        b, volume, bal.relative_volume(b, times[points - 1], state)
-    ):
+    end_volume = bal.relative_volume(b, path.times[points - 1], state)
+    if status == Status.OK.value and _leaves_table(b, volume, end_volume):
         status = Status.OUT_OF_ISENTROPE.value
-    return summarise(
-        b,
-        status,
-        steps,
-        ejection_time,
-        times[:points],
-        states[:points],
-        slopes[:points],
-        gas_energy,
-        history_points,
-    )
+    used = Path(path.times[:points], path.states[:points], path.slopes[:points])
+    return summarise(b, status, steps, ejection_time, used, gas_energy, history_points)
 
 
 @kernel
