@@ -68,8 +68,9 @@ def check_jwl(jwl: JwlSet, heat_of_explosion: float) -> list[Finding]:
     findings += _jwl_energy(jwl, complete)
     if c > 0.0:
         findings += _shape(complete.isentrope, complete.cj.relative_volume)
-        findings += check_work(complete.isentrope, complete.total_energy / jwl.density,
-                          heat_of_explosion, jwl.density)  # fmt: skip
+        findings += check_work(
+            complete.isentrope, complete.total_energy / jwl.density, heat_of_explosion, jwl.density
+        )
     return findings
 
 
@@ -77,28 +78,37 @@ def _jwl_signs(jwl: JwlSet) -> list[Finding]:
     smallest = min(jwl.a, jwl.b)
     return [
         judge_flag("A and B positive", smallest * 1e-9, "> 0", smallest > 0.0, "GPa"),
-        judge_flag("R1 above R2", jwl.r1 / jwl.r2 if jwl.r2 else math.inf, "R1 > R2 > 0",
-              jwl.r1 > jwl.r2 > 0.0),
+        judge_flag(
+            "R1 above R2",
+            jwl.r1 / jwl.r2 if jwl.r2 else math.inf,
+            "R1 > R2 > 0",
+            jwl.r1 > jwl.r2 > 0.0,
+        ),
         judge_flag("omega", jwl.omega, "between 0 and 1", 0.0 < jwl.omega < 1.0),
-    ]  # fmt: skip
+    ]
 
 
 def _cj_findings(isentrope: ProductIsentrope, state: CjState, jwl: JwlSet) -> list[Finding]:
-    """Gamma, tangency and, where the state was not made from C, passage through the CJ state."""
+    """Gamma, and how the isentrope meets the Rayleigh line of D.
+
+    A state stated by its pressure is held against slope and pressure of the curve. A state made
+    from a stated C is where the two slopes agree; what can fail there is that the curves meet.
+    """
     volume = state.relative_volume
     steepness = jwl.density * jwl.detonation_velocity**2
     on_curve = pressure(isentrope, volume)
-    steep = slope(isentrope, volume) * on_curve / volume
-    findings = [
-        judge_range("gamma at the CJ state", state.gamma, (1.8, 4.0), (1.5, 5.0)),
-        judge_deviation("tangency (slope at the CJ state against rho0 D^2)",
-                   steep / steepness - 1.0, 0.02, 0.05),
-    ]  # fmt: skip
-    if jwl.c is not None:
-        findings.append(
-            judge_deviation("P_s(V_J) against the Rayleigh line of D",
-                       on_curve / state.pressure - 1.0, 0.02, 0.05)
-        )  # fmt: skip
+    gap = on_curve / state.pressure - 1.0
+    bend = slope(isentrope, volume) * on_curve / volume / steepness - 1.0
+    findings = [judge_range("gamma at the CJ state", state.gamma, (1.8, 4.0), (1.5, 5.0))]
+    if jwl.cj_pressure is None and jwl.c is not None:
+        name = "tangency (P_s where it runs parallel to the Rayleigh line of D, against that line)"
+        findings.append(judge_deviation(name, gap, 0.02, 0.05))
+    else:
+        name = "tangency (slope at the CJ state against rho0 D^2)"
+        findings.append(judge_deviation(name, bend, 0.02, 0.05))
+        if jwl.c is not None:
+            name = "P_s(V_J) with the stated C against P_CJ"
+            findings.append(judge_deviation(name, gap, 0.02, 0.05))
     ratio = pressure(isentrope, 1.0) / state.pressure
     findings.append(judge_range("P_s(1) over P_CJ", ratio, (0.35, 0.50), (0.0, 1.0)))
     return findings
@@ -108,25 +118,21 @@ def _jwl_energy(jwl: JwlSet, complete: CompleteJwl) -> list[Finding]:
     """Hugoniot, and the CJ state that the equation of state itself predicts."""
     findings = []
     if jwl.total_energy is not None:
-        implied = energy_behind(complete.isentrope, complete.cj)
-        findings.append(
-            judge_deviation("Hugoniot (E_s(V_J) - P_J (1 - V_J)/2 against E0)",
-                       implied / jwl.total_energy - 1.0, 0.02, 0.10)
-        )  # fmt: skip
+        implied = energy_behind(complete.isentrope, complete.cj) / jwl.total_energy - 1.0
+        name = "Hugoniot (E_s(V_J) - P_J (1 - V_J)/2 against E0)"
+        findings.append(judge_deviation(name, implied, 0.02, 0.10))
     own = own_cj_state(jwl, complete.total_energy)
     if own is None:
         limit = "a slowest Rayleigh line that reaches the Hugoniot"
         return [*findings, judge_flag("CJ state of the equation of state", 0.0, limit, False)]
     state, velocity = own
-    findings.append(
-        judge_deviation("velocity of the own CJ state against D",
-                   velocity / jwl.detonation_velocity - 1.0, 0.01, 0.02)
-    )  # fmt: skip
-    findings.append(
-        judge_deviation("pressure of the own CJ state against P_CJ",
-                   state.pressure / complete.cj.pressure - 1.0, 0.02, 0.05)
-    )  # fmt: skip
-    return findings
+    faster = velocity / jwl.detonation_velocity - 1.0
+    higher = state.pressure / complete.cj.pressure - 1.0
+    return [
+        *findings,
+        judge_deviation("velocity of the own CJ state against D", faster, 0.01, 0.02),
+        judge_deviation("pressure of the own CJ state against P_CJ", higher, 0.02, 0.05),
+    ]
 
 
 def _shape(isentrope: ProductIsentrope, first_volume: float) -> list[Finding]:

@@ -70,9 +70,13 @@ def check_table(
     reference = state.pressure if cj_pressure is None else cj_pressure
     if cj_pressure is not None:
         findings.append(
-            judge_deviation("touching point of the Rayleigh line against P_CJ",
-                       state.pressure / cj_pressure - 1.0, 0.05, 0.20)
-        )  # fmt: skip
+            judge_deviation(
+                "touching point of the Rayleigh line against P_CJ",
+                state.pressure / cj_pressure - 1.0,
+                0.05,
+                0.20,
+            )
+        )
     ratio = pressure(table, 1.0) / reference
     hard = (0.35, 0.50) if cj_pressure is not None else (0.25, 0.65)
     findings.append(judge_range("P_s(1) over P_CJ", ratio, (0.35, 0.50), hard))
@@ -111,9 +115,14 @@ def _table_shape(volume: FloatArray, pressures: FloatArray) -> list[Finding]:
         judge_flag("largest exponent -dlnP/dlnV", high, "< 6", high < 6.0),
         judge_flag("convex pressure (smallest change of slope)", bend, "> 0", bend > 0.0),
         judge_flag("first relative volume", first, "at most 1", first <= 1.0),
-        judge_flag("last pressure", last * 1e-6, f"at most {TABLE_END_PRESSURE * 1e-6:g} MPa",
-              last <= TABLE_END_PRESSURE, "MPa"),
-    ]  # fmt: skip
+        judge_flag(
+            "last pressure",
+            last * 1e-6,
+            f"at most {TABLE_END_PRESSURE * 1e-6:g} MPa",
+            last <= TABLE_END_PRESSURE,
+            "MPa",
+        ),
+    ]
 
 
 def _energy_column(table: ProductIsentrope, energies: FloatArray) -> Finding:

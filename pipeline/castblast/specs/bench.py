@@ -32,7 +32,7 @@ from castblast.variables import VARIABLES
 
 _FOLDER = "data_specs/benches"
 _RIGHT_ANGLE = math.pi / 2.0
-_LARGEST_BALL_SHARE = 0.25  # of the smallest side of the bench, in diameters
+_LARGEST_BALL_SHARE = 0.4  # of the smallest side of the bench, in diameters
 _FROM_BENCH = ("burden", "spacing", "bench_height", "face_angle")
 
 _Length = Annotated[float, QuantityIn("m", above=0.0, upper=2000.0)]
@@ -53,9 +53,13 @@ class BenchGeometry(Spec):
     def to_bench(self) -> Bench:
         """Geometry as the discrete-element model takes it."""
         return Bench(
-            self.length, self.width, self.height, min(self.face_angle, _RIGHT_ANGLE),
-            self.burden, self.spacing,
-        )  # fmt: skip
+            self.length,
+            self.width,
+            self.height,
+            min(self.face_angle, _RIGHT_ANGLE),
+            self.burden,
+            self.spacing,
+        )
 
     @model_validator(mode="after")
     def _possible(self) -> BenchGeometry:
@@ -237,22 +241,21 @@ class BenchSpec(Spec):
             faults.append("firing.pattern 'none' takes no velocity")
         if self.firing.pattern != "none" and given != 1:
             faults.append("either 'velocity' or 'surrogate' is needed")
-        faults += self._room_for_balls()
+        if self.balls.mean_radius is not None:
+            faults += self.room_faults(self.balls.mean_radius)
         if faults:
             raise QuantityError("; ".join(faults))
         return self
 
-    def _room_for_balls(self) -> list[str]:
-        radius = self.balls.mean_radius
-        if radius is None:
-            return []
-        largest = 2.0 * radius * (1.0 + self.balls.relative_deviation)
+    def room_faults(self, mean_radius: float) -> list[str]:
+        """Say whether balls of a mean radius [m] are too large for the bench; []: they are not."""
+        largest = 2.0 * mean_radius * (1.0 + self.balls.relative_deviation)
         side = min(self.bench.length, self.bench.width, self.bench.height)
         if largest <= _LARGEST_BALL_SHARE * side:
             return []
         return [
-            f"balls.mean_radius {radius:g} m: balls up to {largest:.3g} m leave no room for a "
-            f"packing in a bench with a side of {side:g} m"
+            f"balls: a mean radius of {mean_radius:.3g} m gives balls up to {largest:.3g} m, too "
+            f"large for a bench with a side of {side:g} m"
         ]
 
     def design(self) -> dict[str, Any] | None:

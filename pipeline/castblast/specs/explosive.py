@@ -150,9 +150,17 @@ class ExplosiveSpec(Spec):
         if jwl is None:
             return None
         return JwlSet(
-            self.density, self.detonation_velocity, jwl.A, jwl.B, jwl.R1, jwl.R2, jwl.omega,
-            jwl.C, jwl.E0, self.cj_pressure,
-        )  # fmt: skip
+            self.density,
+            self.detonation_velocity,
+            jwl.A,
+            jwl.B,
+            jwl.R1,
+            jwl.R2,
+            jwl.omega,
+            jwl.C,
+            jwl.E0,
+            self.cj_pressure,
+        )
 
     def table(self) -> tuple[FloatArray, FloatArray, FloatArray | None] | None:
         """Relative volume, pressure [Pa] and energy [J m-3] or None; None for a JWL set."""

@@ -42,8 +42,14 @@ class CheckOutcome:
 
 def catalogue() -> list[dict[str, Any]]:
     """Short descriptions of the catalogue, in alphabetical order; SI units."""
-    keys = ("name", "density", "detonation_velocity", "heat_of_explosion", "cj_pressure",
-            "explosion_pressure")  # fmt: skip
+    keys = (
+        "name",
+        "density",
+        "detonation_velocity",
+        "heat_of_explosion",
+        "cj_pressure",
+        "explosion_pressure",
+    )
     described = [describe(name) for name in explosive_names()]
     return [{key: entry[key] for key in keys} for entry in described]
 
@@ -61,11 +67,15 @@ def describe(name_or_path: str) -> dict[str, Any]:
     # The curve of an inconsistent set may turn negative and then reaches no pressure at all.
     reached = () if rejected(spec.check()) else WORK_PRESSURES
     isentrope = explosive.isentrope
-    at_cj = {} if state is None else {
-        "cj_pressure": state.pressure,
-        "cj_relative_volume": state.relative_volume,
-        "cj_gamma": state.gamma,
-    }  # fmt: skip
+    at_cj = (
+        {}
+        if state is None
+        else {
+            "cj_pressure": state.pressure,
+            "cj_relative_volume": state.relative_volume,
+            "cj_gamma": state.gamma,
+        }
+    )
     return {
         "name": spec.name,
         "form": "table" if isentrope.tabulated else "JWL",

@@ -1,0 +1,213 @@
+"""What comes out of a thrown bench: a document in SI units, tables, and pictures."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from castblast.errors import Status
+from castblast.files import write_csv, write_text, write_with
+from castblast.muckpile.bench import Bench, block_shape
+from castblast.muckpile.particles import Particles
+from castblast.muckpile.profile import (
+    HeightField,
+    PileMetrics,
+    Profile,
+    mean_profile,
+    section,
+    surface_height,
+)
+from castblast.muckpile.solver import CastHistory, CastResult
+from castblast.specs.bench import BenchSpec
+
+#: Shares of the length of the bench at which the profile is written, besides the mean.
+SECTIONS = (0.25, 0.5, 0.75)
+# Balls of a file may lie beside the bench: then the surface is taken over all of them.
+_INSIDE_SHARE = 0.9
+
+
+@dataclass(frozen=True)
+class MuckpileOutcome:
+    """What a run found: a document in SI units, the same for people, and the files written."""
+
+    document: dict[str, Any]
+    title: str
+    rows: list[tuple[str, str, str]]
+    files: list[Path] = field(default_factory=list)
+
+
+class Start(NamedTuple):
+    """Balls before firing and how they came about.
+
+    Attributes
+    ----------
+    balls : Particles
+    solid_fraction : float [-]
+        Reached by the packing; NaN for a file of balls.
+    reused : bool
+        The packing is that of an earlier run.
+    """
+
+    balls: Particles
+    solid_fraction: float
+    reused: bool
+
+
+def describe_run(
+    spec: BenchSpec,
+    speed: float,
+    prediction: Mapping[str, Any] | None,
+    start: Start,
+    result: CastResult,
+    metrics: PileMetrics,
+) -> MuckpileOutcome:
+    """Put the results of a run into a document and rows for people; NaN where nothing is known."""
+    counters = result.counters._asdict()
+    seconds = counters.pop("seconds")
+    document = {
+        "bench": spec.name,
+        "bench_sha256": spec.sha256(),
+        "status": Status(result.status).name.lower(),
+        "balls": len(start.balls.radius),
+        "mean_radius": float(start.balls.radius.mean()),
+        "solid_fraction": start.solid_fraction,
+        "packing_reused": start.reused,
+        "initial_velocity": speed,
+        "surrogate": dict(prediction) if prediction else None,
+        "simulated_time": result.time,
+        **metrics._asdict(),
+        "ledger": result.ledger._asdict(),
+        "counters": counters,
+        "seconds": seconds,
+    }
+    plain = {key: _plain(value) for key, value in document.items()}
+    title = f"{spec.name}: {plain['balls']:,} balls, {speed:.3g} m/s, {result.time:.1f} s simulated"
+    if Status(result.status) is Status.NOT_CONVERGED:
+        title += " (longest time reached before the pile came to rest)"
+    return MuckpileOutcome(plain, title, _rows(plain))
+
+
+def _rows(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    throw = document["throw"]
+    entries = (
+        ("throw of the centre of mass", throw[0], "m"),
+        ("drop of the centre of mass", -throw[2], "m"),
+        ("cast fraction", 100.0 * document["cast_fraction"], "%"),
+        ("run-out of 95 % of the mass", document["runout_95"], "m"),
+        ("run-out of 99 % of the mass", document["runout_99"], "m"),
+        ("maximum height", document["maximum_height"], "m"),
+        ("swell", document["swell"], "-"),
+        ("repose angle", math.degrees(document["repose_angle"]), "deg"),
+        ("throw in free flight", document["ballistic_throw"], "m"),
+        ("open energy balance", 100.0 * document["ledger"]["residual"], "%"),
+        ("time on the clock", document["seconds"], "s"),
+    )
+    return [(name, f"{value:.3g}", unit) for name, value, unit in entries]
+
+
+def write_results(
+    folder: Path,
+    spec: BenchSpec,
+    before: Particles,
+    result: CastResult,
+    document: Mapping[str, Any],
+) -> list[Path]:
+    """Write final state, profile, history, metrics and pictures into `folder`.
+
+    The files depend on bench file and code only: the time on the clock is left out of them.
+    """
+    from castblast.report.muckpile_figures import draw_energy, draw_plan, draw_section
+
+    bench, after = spec.bench.to_bench(), result.particles
+    surface = _surface(before, after, bench)
+    mean = mean_profile(surface)
+    stored: dict[str, Any] = {
+        "x": after.position,
+        "r": after.radius,
+        "v": after.velocity,
+        "w": after.angular_velocity,
+        "block": after.block,
+        "x_before": before.position,
+    }
+    slope = (spec.slope.distance, spec.slope.angle) if spec.slope else None
+    timeless = {k: v for k, v in document.items() if k not in ("seconds", "packing_reused")}
+    return [
+        write_with(folder / "final_state.npz", lambda name: np.savez_compressed(name, **stored)),
+        write_csv(folder / "profile.csv", _profile_columns(surface, mean)),
+        write_csv(folder / "history.csv", _history_columns(result.history)),
+        write_text(folder / "metrics.json", json.dumps(_finite(timeless), indent=2) + "\n"),
+        draw_section(
+            folder / "section.png",
+            before,
+            after,
+            bench,
+            y=_section_place(before, bench),
+            mean_profile=mean,
+            slope=slope,
+        ),
+        draw_plan(folder / "plan.png", before, after, bench),
+        draw_energy(folder / "energy.png", result.history),
+    ]
+
+
+def _inside(balls: Particles, bench: Bench) -> bool:
+    along = balls.position[:, 1]
+    return bool(((along >= 0.0) & (along <= bench.length)).mean() >= _INSIDE_SHARE)
+
+
+def _surface(before: Particles, after: Particles, bench: Bench) -> HeightField:
+    cell = float(2.0 * after.radius.mean())
+    span = (0.0, bench.length) if _inside(before, bench) else None
+    return surface_height(after.position, after.radius, cell=cell, y_range=span)
+
+
+def _section_place(before: Particles, bench: Bench) -> float:
+    """Middle of the column of blocks nearest to the middle of the bench."""
+    if not _inside(before, bench):
+        return float(np.median(before.position[:, 1]))
+    _, columns = block_shape(bench)
+    return min((columns // 2 + 0.5) * bench.spacing, bench.length)
+
+
+def _profile_columns(surface: HeightField, mean: Profile) -> dict[str, Any]:
+    columns: dict[str, Any] = {"x [m]": mean.x, "mean_height [m]": mean.height}
+    low, high = float(surface.y[0]), float(surface.y[-1])
+    for share in SECTIONS:
+        y = low + share * (high - low)
+        columns[f"height_at_y_{y:.1f}_m [m]"] = section(surface, y).height
+    return columns
+
+
+def _history_columns(history: CastHistory) -> dict[str, Any]:
+    centre = history.centre_of_mass
+    return {
+        "time [s]": history.time,
+        "translational_energy [J]": history.translational_energy,
+        "rotational_energy [J]": history.rotational_energy,
+        "centre_x [m]": centre[:, 0],
+        "centre_y [m]": centre[:, 1],
+        "centre_z [m]": centre[:, 2],
+        "contacts": history.contacts,
+    }
+
+
+def _plain(value: Any) -> Any:
+    """Arrays and NumPy scalars as Python lists and numbers."""
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+
+
+def _finite(value: Any) -> Any:
+    """NaN and infinity as null, which JSON can hold."""
+    if isinstance(value, Mapping):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
