@@ -61,18 +61,18 @@ def build_shards(
         return lines
     finished = sum(len(task.sample) for task in done)
     total = finished + sum(len(task.sample) for task in todo)
-    progress(finished / total, "; ".join([*lines, "compiling, once per installation"]))
-    _warm(todo[0])
-    begin = time.perf_counter()
     fresh = failed = 0
     with _quiet_dask(), _client(workers, scheduler) as client:
+        progress(finished / total, "; ".join([*lines, "compiling, once per installation"]))
+        _warm(todo[0])
+        begin = time.perf_counter()
         for report in _reports(client, todo):
             fresh += report.count
             failed += report.failed
             rate = fresh / (time.perf_counter() - begin)
             line = _progress_line(finished + fresh, total, failed, rate)
             progress((finished + fresh) / total, line)
-    seconds = time.perf_counter() - begin
+        seconds = time.perf_counter() - begin
     return [*lines, f"{fresh} samples in {seconds:.1f} s, {fresh / seconds:.0f} samples/s"]
 
 

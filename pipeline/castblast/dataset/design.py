@@ -63,15 +63,15 @@ class Design(NamedTuple):
     drawn: int
 
 
-def make_design(recipe: Recipe, simulator: Simulator) -> Design:
-    """Draw the rows of a recipe.
+def make_design(recipe: Recipe, simulator: Simulator, where: str) -> Design:
+    """Draw the rows of a recipe; `where` names its file in messages.
 
     Raises
     ------
     SpecError
         Next to none of the rows are possible; the message names the constraints that refuse them.
     """
-    _require_possible(recipe, simulator)
+    _require_possible(recipe, simulator, where)
     size = recipe.size
     kept: list[dict[str, FloatArray]] = []
     batches: list[int] = []
@@ -86,7 +86,10 @@ def make_design(recipe: Recipe, simulator: Simulator) -> Design:
         if missing == 0:
             break
     else:
-        message = f"{missing} of {size} designs are still impossible after {drawn} were drawn"
+        message = (
+            f"{where}: variables: {missing} of {size} designs are still impossible after {drawn} "
+            "were drawn"
+        )
         raise SpecError(message)
     joined = {name: np.concatenate([part[name] for part in kept]) for name in kept[0]}
     explosive = _balanced(size, len(recipe.explosives), _stream(recipe, _EXPLOSIVES, 0))
@@ -192,7 +195,7 @@ def _constraint_faults(rules: Constraints, inputs: Columns) -> list[str]:
     return faults
 
 
-def _require_possible(recipe: Recipe, simulator: Simulator) -> None:
+def _require_possible(recipe: Recipe, simulator: Simulator, where: str) -> None:
     """Stop where next to nothing can be simulated, before anything is."""
     count = max(_PILOT_ROWS, min(recipe.size, 4 * _PILOT_ROWS))
     columns = draw_batch(recipe, count, _stream(recipe, _PILOT, 0))
@@ -206,7 +209,7 @@ def _require_possible(recipe: Recipe, simulator: Simulator) -> None:
         for kind, _ in kinds.most_common(3)
     ]
     message = (
-        f"variables: {len(faults) / count:.1%} of the designs in these ranges are impossible; "
-        f"nothing was run. Refused are {'; '.join(lines)}"
+        f"{where}: variables: {len(faults) / count:.1%} of the designs in these ranges are "
+        f"impossible; nothing was run. Refused are {'; '.join(lines)}"
     )
     raise SpecError(message)

@@ -54,12 +54,16 @@ def load_explosives(source: RecipeSource) -> tuple[ExplosiveSource, ...]:
     for written in source.recipe.explosives:
         try:
             path = find_explosive(written)
-            path = path if path.is_absolute() else source.folder / path
+            path = path if path.is_absolute() else source.path.parent / path
             found.append(explosive_from_text(read_text(path), str(path)))
         except SpecError as fault:
-            faults.append(f"explosives: {fault}")
+            faults.append(f"{source.path}: explosives: {fault}")
     names = [entry.name for entry in found]
-    faults += [f"explosives: two are called {n}" for n in sorted(set(names)) if names.count(n) > 1]
+    faults += [
+        f"{source.path}: explosives: two are called {name}"
+        for name in sorted(set(names))
+        if names.count(name) > 1
+    ]
     if faults:
         raise SpecError("\n".join(faults))
     return tuple(found)
@@ -96,7 +100,8 @@ def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
     lines = []
     for key in sorted({*before, *after}):
         left, right = before.get(key), after.get(key)
-        if left != right:
+        listed = key.startswith("explosives.") and None in (left, right)
+        if left != right and not listed:  # the list of the recipe says that one came or went
             lines.append(_difference(key, left, right))
     return lines
 

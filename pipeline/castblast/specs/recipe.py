@@ -7,6 +7,7 @@ A recipe is the only input of a build. Every variable that is not named in it ta
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
@@ -131,6 +132,8 @@ class VariableSpec(Spec):
         """Quantile of the marginal; `share` in [0, 1]."""
         if self.lower is None or self.upper is None:
             return math.nan if self.value is None else self.value
+        if share in (0.0, 1.0):
+            return self.upper if share else self.lower  # exactly, without rounding of exp and log
         if self.distribution == "log_uniform":
             return math.exp(
                 math.log(self.lower) + share * (math.log(self.upper) - math.log(self.lower))
@@ -253,8 +256,8 @@ class Recipe(Spec):
         Rows that one task simulates and writes.
     """
 
-    name: str = Field(pattern=r"^[a-z][a-z0-9_-]*$", max_length=64)
-    version: str = Field(pattern=r"^\d+\.\d+\.\d+$")
+    name: str
+    version: str
     title: str = Field(min_length=1)
     summary: str = ""
     license: str = "CC-BY-4.0"
@@ -268,14 +271,22 @@ class Recipe(Spec):
     burden_parameter_set: Literal["authors", "field"] = "authors"
     split: SplitShares = SplitShares()
     max_failed_share: float = Field(default=0.01, ge=0.0, le=1.0)
-    shard_size: int = Field(default=250, ge=1)
+    shard_size: int = Field(default=50, ge=1)
+
+    @field_validator("name")
+    @classmethod
+    def _folder_name(cls, name: str) -> str:
+        if not re.fullmatch(r"[a-z][a-z0-9_-]{0,63}", name):
+            message = "lower-case letters, digits, '-' and '_' are allowed, a letter first"
+            raise ValueError(message)
+        return name
 
     @field_validator("version", mode="before")
     @classmethod
     def _three_numbers(cls, version: object) -> object:
-        if isinstance(version, int | float):
+        if not re.fullmatch(r"\d+\.\d+\.\d+", str(version)):
             message = "three numbers are needed, such as 1.0.0"
-            raise ValueError(message)  # noqa: TRY004 - pydantic collects ValueErrors
+            raise ValueError(message)
         return version
 
     @field_validator("explosives")
@@ -353,11 +364,11 @@ class Recipe(Spec):
 
 
 class RecipeSource(NamedTuple):
-    """A recipe with the text it was read from, which goes into the dataset, and its folder."""
+    """A recipe with the text it was read from, which goes into the dataset, and its file."""
 
     recipe: Recipe
     text: str
-    folder: Path
+    path: Path
 
 
 def load_recipe(path: Path, size: int | None = None) -> RecipeSource:
@@ -374,7 +385,7 @@ def load_recipe(path: Path, size: int | None = None) -> RecipeSource:
         content["size"] = size
         text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
     recipe = make_spec(content, Recipe, str(path), folder=path.parent)
-    return RecipeSource(recipe, text, path.parent)
+    return RecipeSource(recipe, text, path)
 
 
 def recipe_from_text(text: str, where: str) -> Recipe:

@@ -118,7 +118,7 @@ def produce(
     if not restart and is_finished(path, origin):
         line = f"{path}: finished already, from the same recipe"
         return GenerateOutcome(path, (line,), _document(path))
-    design = make_design(recipe, simulator)
+    design = make_design(recipe, simulator, str(source.path))
     folder = open_work_folder(path, origin, restart=restart)
     tasks = make_tasks(design, simulator, rows_hash(origin), folder.resolve(), recipe.shard_size)
     lines = build_shards(tasks, workers=workers, scheduler=scheduler, progress=progress)
