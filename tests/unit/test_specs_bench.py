@@ -85,7 +85,10 @@ def test_design_for_the_surrogate_takes_the_geometry_of_the_bench(tmp_path: Path
         ({"bench": BENCH["bench"] | {"face_angle": "30 deg"}}, "the face would reach the rear"),
         ({"bench": BENCH["bench"] | {"height": "0 m"}}, "bench.height: 0 m: must be larger than 0"),
         ({"bench": BENCH["bench"] | {"lenght": "3 m"}}, "unknown key, did you mean 'length'?"),
-        ({"balls": {"mean_radius": "2 m"}}, "too large for a bench with a side of 6 m"),
+        (
+            {"balls": {"mean_radius": "2 m"}},
+            "must fit at least twice into the shortest side of the bench, 6 m",
+        ),
         ({"balls": {}}, "exactly one of 'mean_radius', 'count' and 'file' is needed"),
         ({"balls": {"count": 3}}, "balls.count: 3: input should be greater than or equal to 10"),
         ({"velocity": "12.7 km/s"}, "velocity: 12.7 km/s: implausible; allowed: 0 to 100 m s-1"),

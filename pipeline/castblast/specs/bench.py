@@ -24,6 +24,7 @@ from castblast.muckpile.bench import (
     v_delays,
 )
 from castblast.muckpile.contact import ContactLaw, DashpotMode
+from castblast.muckpile.packing import check_packing
 from castblast.muckpile.particles import FloatArray
 from castblast.resources import resource
 from castblast.specs.loading import Spec, load_spec
@@ -32,7 +33,6 @@ from castblast.variables import VARIABLES
 
 _FOLDER = "data_specs/benches"
 _RIGHT_ANGLE = math.pi / 2.0
-_LARGEST_BALL_SHARE = 0.4  # of the smallest side of the bench, in diameters
 _FROM_BENCH = ("burden", "spacing", "bench_height", "face_angle")
 
 _Length = Annotated[float, QuantityIn("m", above=0.0, upper=2000.0)]
@@ -249,14 +249,12 @@ class BenchSpec(Spec):
 
     def room_faults(self, mean_radius: float) -> list[str]:
         """Say whether balls of a mean radius [m] are too large for the bench; []: they are not."""
-        largest = 2.0 * mean_radius * (1.0 + self.balls.relative_deviation)
-        side = min(self.bench.length, self.bench.width, self.bench.height)
-        if largest <= _LARGEST_BALL_SHARE * side:
-            return []
-        return [
-            f"balls: a mean radius of {mean_radius:.3g} m gives balls up to {largest:.3g} m, too "
-            f"large for a bench with a side of {side:g} m"
-        ]
+        return check_packing(
+            self.bench.to_bench(),
+            mean_radius,
+            self.balls.relative_deviation,
+            self.balls.solid_fraction,
+        )
 
     def design(self) -> dict[str, Any] | None:
         """Design for the surrogate in SI units, with the geometry of the bench; None without."""

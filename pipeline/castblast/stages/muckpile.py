@@ -147,7 +147,7 @@ def _start(
         balls = read_balls(beside / spec.balls.file)
         if spec.firing.pattern != "none" and (balls.block < 0).all():
             balls = balls._replace(block=assign_blocks(balls.position, bench))
-        return Start(balls, float("nan"), False)
+        return Start(balls)
     key, cache = _packing_key(spec), folder / "packing.npz"
     stored = _read_packing(cache, key)
     if stored is not None:
@@ -172,10 +172,11 @@ def _start(
         threads=threads,
         progress=progress,
     )
-    if Status(packing.status) is not Status.OK:
+    if Status(packing.status) is Status.UNSTABLE_STEP:
         message = f"{spec.name}: the bench could not be packed: {Status(packing.status).meaning}"
         raise SimulationError(message)
-    start = Start(packing.particles, float(packing.solid_fraction), False)
+    settled = Status(packing.status) is Status.OK
+    start = Start(packing.particles, float(packing.solid_fraction), settled=settled)
     _write_packing(cache, key, start)
     return start
 
@@ -193,7 +194,8 @@ def _read_packing(path: Path, key: str) -> Start | None:
             if str(stored["key"]) != key:
                 return None
             balls = particles_at_rest(stored["x"], stored["r"], stored["block"])
-            return Start(balls, float(stored["solid_fraction"]), True)
+            fraction, settled = float(stored["solid_fraction"]), bool(stored["settled"])
+            return Start(balls, fraction, settled=settled, reused=True)
     except (OSError, ValueError, KeyError, EOFError):
         return None
 
@@ -206,6 +208,7 @@ def _write_packing(path: Path, key: str, start: Start) -> None:
         "r": balls.radius,
         "block": balls.block,
         "solid_fraction": np.array(start.solid_fraction),
+        "settled": np.array(start.settled),
     }
     write_with(path, lambda name: np.savez(name, **arrays))
 

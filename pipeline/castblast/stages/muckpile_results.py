@@ -50,13 +50,16 @@ class Start(NamedTuple):
     balls : Particles
     solid_fraction : float [-]
         Reached by the packing; NaN for a file of balls.
+    settled : bool
+        The packing came to rest before it was fired; True for a file of balls, as given.
     reused : bool
         The packing is that of an earlier run.
     """
 
     balls: Particles
-    solid_fraction: float
-    reused: bool
+    solid_fraction: float = math.nan
+    settled: bool = True
+    reused: bool = False
 
 
 def describe_run(
@@ -77,6 +80,7 @@ def describe_run(
         "balls": len(start.balls.radius),
         "mean_radius": float(start.balls.radius.mean()),
         "solid_fraction": start.solid_fraction,
+        "packing_settled": start.settled,
         "packing_reused": start.reused,
         "initial_velocity": speed,
         "surrogate": dict(prediction) if prediction else None,
