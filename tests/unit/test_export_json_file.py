@@ -1,0 +1,83 @@
+"""A network.json that cannot be used is refused in one line that names the file and the entry."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from castblast.errors import SpecError
+from castblast.export.json_file import read_network, to_json
+from castblast.specs.model import PAPER_FEATURES, PAPER_TARGETS, RidgeSpec
+from castblast.surrogate.features import read_table
+from castblast.surrogate.training import fit_spec
+
+
+@pytest.fixture(scope="module")
+def text(toy_dataset) -> str:
+    spec = RidgeSpec(name="ridge", input_transform="log", target_transform="log")
+    table = read_table(toy_dataset(600), PAPER_FEATURES, PAPER_TARGETS)
+    return to_json(fit_spec(spec, table).network)
+
+
+def test_the_file_says_what_a_reader_needs(text: str) -> None:
+    document = json.loads(text)
+    assert document["schema_version"] == 1
+    assert document["explosives"] == ["anfo", "doped_emulsion", "gassed_emulsion", "heavy_anfo"]
+    assert document["inputs"][0]["unit"] == "Pa"
+    assert 0.0 < document["outputs"][0]["relative_band"] < 1.0
+    assert len(document["golden"]["inputs"]) == 200
+    provenance = document["provenance"]
+    assert provenance["dataset"]["content_sha256"] == "a" * 64
+    assert provenance["dataset"]["recipe_sha256"] == "b" * 64
+    assert provenance["spec"]["name"] == "ridge"
+    assert 0.9 < provenance["scores"]["test"]["burden_velocity"]["r2"] <= 1.0
+    assert provenance["band_coverage_on_test"]["burden_velocity"] > 0.8
+
+
+def test_no_times_or_paths_in_the_file(text: str) -> None:
+    assert "seconds" not in text
+    assert "/" not in text.replace("m s-1", "")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda d: d.pop("layers"), "entry 'layers' is missing"),
+        (lambda d: d.update(format="onnx"), "not a network of castblast"),
+        (lambda d: d.update(schema_version=9), "schema version 9, this one reads 1"),
+        (lambda d: d["layers"][0].update(biases=["x"]), "unusable entry"),
+        (lambda d: d["layers"][0].update(weights=[[1.0], [2.0]]), "do not take 10 values"),
+        (lambda d: d["inputs"][0].pop("mean"), "unusable entry"),
+        (lambda d: d.update(outputs=[]), "at least one input, output"),
+    ],
+)
+def test_a_garbled_file_is_named(text: str, tmp_path: Path, change, message: str) -> None:
+    document = json.loads(text)
+    change(document)
+    path = tmp_path / "network.json"
+    path.write_text(json.dumps(document))
+    with pytest.raises(SpecError, match=message) as fault:
+        read_network(path)
+    assert str(fault.value).startswith(f"{path}: ")
+
+
+def test_a_cut_file_names_the_line(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "network.json"
+    path.write_text(text[: len(text) // 2])
+    with pytest.raises(SpecError, match=r"network\.json: line \d+: not JSON"):
+        read_network(path)
+
+
+@pytest.mark.parametrize("content", [b"", b"[1]", b"\xff\xfe\x00"])
+def test_other_files_are_refused(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "network.json"
+    path.write_bytes(content)
+    with pytest.raises(SpecError, match=r"not JSON|not a network|not a text"):
+        read_network(path)
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match=r"none\.json: no such file"):
+        read_network(tmp_path / "none.json")
+    with pytest.raises(SpecError, match="cannot be read"):
+        read_network(tmp_path)
