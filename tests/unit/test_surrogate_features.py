@@ -75,7 +75,7 @@ def test_fewer_training_rows_are_nested_and_leave_the_rest(table) -> None:
 def test_domain_rules_hold_for_every_training_row_and_touch_one(table) -> None:
     train = table.frame.iloc[table.rows("train")]
     rules = domain_constraints(table)
-    assert len(rules) == 3
+    assert len(rules) == 5
     for rule in rules:
         margin = np.asarray(rule.margin(train))
         assert margin.min() >= 0.0

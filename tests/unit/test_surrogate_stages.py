@@ -119,7 +119,7 @@ def test_prediction_of_a_plain_design(network: Path) -> None:
 
 
 def test_prediction_is_near_the_formula_it_was_trained_on(network: Path) -> None:
-    """12 (d / 0.15) B^-0.8 (L_c / H)^0.5 s (1 + 0.1 tanh(B / 3 - 1)) with s = 1.2 for heavy ANFO."""
+    """12 (d / 0.15) B^-0.8 (L_c / H)^0.5 s (1 + 0.1 tanh(B / 3 - 1)), s = 1.2 for heavy ANFO."""
     design = {"burden": 2.5, "bench_height": 15.0, "charge_length": 13.0, "hole_diameter": 0.2}
     answer = predict(design, "heavy_anfo", network)
     truth = 12 * (0.2 / 0.15) * 2.5**-0.8 * (13 / 15) ** 0.5 * 1.2

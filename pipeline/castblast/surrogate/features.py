@@ -36,6 +36,7 @@ _RATIOS: tuple[tuple[str, dict[str, float], str, bool], ...] = (
         "burden",
         True,
     ),
+    ("charge length", {"charge_length": 1.0}, "bench_height", True),
     ("charge length", {"charge_length": 1.0}, "hole_diameter", False),
 )
 _PROVENANCE = ("name", "dataset_version", "content_sha256", "recipe_sha256")
@@ -247,8 +248,8 @@ def domain_constraints(table: Table) -> tuple[Constraint, ...]:
     """Rules of the domain that no box of single inputs can say, read off the training rows.
 
     Charge length, bench height and burden are tied: what the charge leaves of the hole is its
-    stemming, and that was only trained between two multiples of the burden. A charge was never
-    shorter than some multiple of its diameter.
+    stemming, and that was only trained between two multiples of the burden, the charge between two
+    shares of the bench. A charge was never shorter than some multiple of its diameter.
     """
     rules = []
     for label, parts, base, two_sided in _RATIOS:
