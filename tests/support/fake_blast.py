@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
+from castblast.dataset.design import make_design
 from castblast.dataset.provenance import load_explosives
 from castblast.dataset.schema import HISTORIES, plausible_range
 from castblast.dataset.simulation import BatchResult, BlastSimulator, blast_simulator
@@ -44,13 +45,13 @@ class FakeBlast(BlastSimulator):
     """Outputs that are smooth in the inputs; fails on strong rock, or breaks down on demand."""
 
     fail_above: float = float("inf")  # ucs [Pa]
-    break_at: int = -1  # break down in the batch whose first burden is in this place of the design
+    broken: tuple[float, ...] = ()  # break down in batches that begin with one of these burdens
     seconds: float = 0.0  # per batch
 
     def run(self, inputs, explosive):
         if self.seconds:
             time.sleep(self.seconds)
-        if self.break_at >= 0 and inputs["burden"][0] > self.break_at:
+        if inputs["burden"][0] in self.broken:
             message = "the simulator broke down"
             raise RuntimeError(message)
         ucs, burden = inputs["ucs"], inputs["burden"]
@@ -76,12 +77,15 @@ def write_recipe(path: Path, **changes) -> Path:
     return path
 
 
-def fake_simulator(recipe: Path, **settings) -> FakeBlast:
-    """Simulator for a recipe file."""
+def fake_simulator(recipe: Path, *, break_at: int | None = None, **settings) -> FakeBlast:
+    """Simulator for a recipe file; breaks down in all shards from number `break_at` on."""
     source = load_recipe(recipe)
     real = blast_simulator(
         source.recipe, tuple(entry.spec.to_explosive() for entry in load_explosives(source))
     )
+    if break_at is not None:
+        burden = make_design(source.recipe, real, "").columns["burden"]
+        settings["broken"] = tuple(burden[:: source.recipe.shard_size][break_at:].tolist())
     return FakeBlast(**{f.name: getattr(real, f.name) for f in fields(real)}, **settings)
 
 

@@ -54,7 +54,7 @@ def test_acceptance_is_the_possible_share_of_the_box(tmp_path):
 
 
 def test_rules_hold_and_nothing_is_clipped_to_their_edge(tmp_path):
-    """Among possible rows B / (2.5 (10 - L)) has density falling to the edge, with no pile there."""
+    """Among possible rows the density of B falls towards the edge 2.5 (10 - L): no pile there."""
     _, design = design_of(tmp_path, size=2000)
     stemming = design.inputs["stemming_length"]
     assert np.allclose(stemming, 10.0 - design.columns["charge_length"])

@@ -1,4 +1,4 @@
-"""Files: whole or not at all, the same bytes every time, one clear line when they cannot be read."""
+"""Files: whole or not at all, equal bytes every time, one clear line when they are unreadable."""
 
 import os
 import time

@@ -139,7 +139,7 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Any]:
         threads_per_worker=workers or _cores(),
         processes=False,
         memory_limit=0,
-        dashboard_address=None,
+        dashboard_address="127.0.0.1:0",  # any free port: a taken one makes Dask complain
         silence_logs=logging.CRITICAL,
     )
     with cluster, Client(cluster, set_as_default=False) as client:

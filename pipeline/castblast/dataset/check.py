@@ -153,8 +153,8 @@ def _value_faults(
         where = np.flatnonzero(~ok & ~np.isnan(values))
         faults.append(_at(dataset, name, where, values, "not NaN in failed samples"))
     low, high = plausible_range(name)
-    margin = 1e-9 * max(abs(low), abs(high))
-    outside = np.flatnonzero(ok & finite & ((values < low - margin) | (values > high + margin)))
+    beyond = (values < low - 1e-9 * abs(low)) | (values > high + 1e-9 * abs(high))
+    outside = np.flatnonzero(ok & finite & beyond)
     if len(outside):
         allowed = f"implausible; allowed: {low:g} to {high:g} {VARIABLES[name].unit}"
         faults.append(_at(dataset, name, outside, values, allowed))
