@@ -345,7 +345,7 @@ INPUTS: tuple[Variable, ...] = (
         1.5,
         "C_Q",
     ),
-    _v("linear_viscosity", "1", "solver", 0.0, 2.0, "linear artificial viscosity", 0.3, "C_L"),
+    _v("linear_viscosity", "1", "solver", 0.0, 2.0, "linear artificial viscosity", 0.15, "C_L"),
 )
 
 OUTPUTS: tuple[Variable, ...] = (

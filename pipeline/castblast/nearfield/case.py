@@ -88,5 +88,5 @@ class NearFieldSettings(NamedTuple):
     outer_radius: float = 0.0
     zones: int = 0
     quadratic_viscosity: float = 1.5
-    linear_viscosity: float = 0.3
+    linear_viscosity: float = 0.15
     history_points: int = 64

@@ -64,26 +64,23 @@ class YieldModel(NamedTuple):
 
     Attributes
     ----------
-    friction : float [-]
-        N, slope of the yield planes.
+    friction, dilation : float [-]
+        N of the friction angle (> 1) and of the dilation angle (1 <= N_psi <= N).
+    lame, twice_shear : float [Pa]
+        Elastic constants lambda and 2 G.
     stiffness : float [Pa]
-        Scale that turns a stress tolerance into a strain tolerance.
-    normal, flow, correction : array (6, 3)
-        Plane normals n, flow directions g, and D g [Pa], on sorted stresses.
-    sets : int array (11, 3)
-        Active sets in the order of trial, -1: unused.
+        lambda + 2 G.
     size : int array (11,)
-        Planes in each set; 0 if the set is singular for this material.
+        Planes in each active set of `_SETS`; 0 if the set is singular for this material.
     inverse : array (11, 3, 3) [1/Pa]
         Inverse of n_i . D g_j of each set.
     """
 
     friction: float
+    dilation: float
+    lame: float
+    twice_shear: float
     stiffness: float
-    normal: FloatArray
-    flow: FloatArray
-    correction: FloatArray
-    sets: IntArray
     size: IntArray
     inverse: FloatArray
 
@@ -161,6 +158,20 @@ def _invert(matrix: FloatArray, n: int, inverse: FloatArray) -> bool:
 
 
 @kernel
+def _flow(plane: int, dilation: float) -> tuple[float, float, float]:
+    """Flow direction of a plane on sorted axes; with N in place of N_psi its normal."""
+    if plane == 0:
+        return -1.0, 0.0, dilation
+    if plane == 1:
+        return -1.0, dilation, 0.0
+    if plane == 2:
+        return 0.0, -1.0, dilation
+    if plane == 3:
+        return 0.0, 0.0, 1.0
+    return (0.0, 1.0, 0.0) if plane == 4 else (1.0, 0.0, 0.0)
+
+
+@kernel
 def make_yield_model(
     bulk_modulus: float, shear_modulus: float, friction: float, dilation: float
 ) -> YieldModel:
@@ -172,71 +183,73 @@ def make_yield_model(
     friction, dilation : float [-]
         N of the friction angle (> 1) and of the dilation angle (1 <= N_psi <= N).
     """
-    normal = np.zeros((6, 3))
-    flow = np.zeros((6, 3))
-    for plane in range(SHEAR_PLANES):
-        low = 1 if plane == 2 else 0
-        high = 1 if plane == 1 else 2
-        normal[plane, low] = -1.0
-        normal[plane, high] = friction
-        flow[plane, low] = -1.0
-        flow[plane, high] = dilation
-    for plane in range(SHEAR_PLANES, 6):
-        normal[plane, 5 - plane] = 1.0
-        flow[plane, 5 - plane] = 1.0
-    correction = np.empty((6, 3))
-    for plane in range(6):
-        volume = flow[plane, 0] + flow[plane, 1] + flow[plane, 2]
-        for axis in range(3):
-            correction[plane, axis] = (
-                bulk_modulus - 2.0 / 3.0 * shear_modulus
-            ) * volume + 2.0 * shear_modulus * flow[plane, axis]
-    sets = _SETS.copy()
-    size = np.zeros(sets.shape[0], dtype=np.int64)
-    inverse = np.zeros((sets.shape[0], 3, 3))
+    twice_shear = 2.0 * shear_modulus
+    lame = bulk_modulus - twice_shear / 3.0
+    count = _SETS.shape[0]
+    size = np.zeros(count, dtype=np.int64)
+    inverse = np.zeros((count, 3, 3))
     matrix = np.zeros((3, 3))
-    for s in range(sets.shape[0]):
+    for s in range(count):
         n = 0
-        while n < 3 and sets[s, n] >= 0:
+        while n < 3 and _SETS[s, n] >= 0:
             n += 1
         for i in range(n):
+            n1, n2, n3 = _flow(_SETS[s, i], friction)
             for j in range(n):
-                matrix[i, j] = 0.0
-                for axis in range(3):
-                    matrix[i, j] += normal[sets[s, i], axis] * correction[sets[s, j], axis]
+                g1, g2, g3 = _flow(_SETS[s, j], dilation)
+                volume = lame * (g1 + g2 + g3)
+                matrix[i, j] = (
+                    n1 * (volume + twice_shear * g1)
+                    + n2 * (volume + twice_shear * g2)
+                    + n3 * (volume + twice_shear * g3)
+                )
         # Without dilation the three shear flows are dependent: the set {13, 12, 23} drops out.
         if _invert(matrix, n, inverse[s]):
             size[s] = n
-    stiffness = bulk_modulus + 4.0 / 3.0 * shear_modulus
-    return YieldModel(friction, stiffness, normal, flow, correction, sets, size, inverse)
+    return YieldModel(
+        friction, dilation, lame, twice_shear, lame + twice_shear, size, inverse
+    )
 
 
 @kernel
-def is_elastic(
-    model: YieldModel, radial: float, hoop: float, axial: float, ucs: float, tension: float
-) -> bool:
-    """Say whether a trial stress is admissible (no tolerance)."""
-    least = max(radial, hoop, axial)
-    most = min(radial, hoop, axial)
-    return model.friction * least - most <= ucs and least <= tension
-
-
-@kernel
-def _rank(radial: float, hoop: float, axial: float) -> tuple[int, int, int]:
-    """Axes (0 radial, 1 hoop, 2 axial) from the most to the least compressive stress."""
+def _rank(radial: float, hoop: float, axial: float) -> tuple[int, int]:
+    """Axes (0 radial, 1 hoop, 2 axial) of the most and of the second most compressive stress."""
     if radial <= hoop:
         if hoop <= axial:
-            return 0, 1, 2
-        return (0, 2, 1) if radial <= axial else (2, 0, 1)
+            return 0, 1
+        return (0, 2) if radial <= axial else (2, 0)
     if radial <= axial:
-        return 1, 0, 2
-    return (1, 2, 0) if hoop <= axial else (2, 1, 0)
+        return 1, 0
+    return (1, 2) if hoop <= axial else (2, 1)
 
 
 @kernel
 def _on_axis(axis: int, i: int, j: int, a: float, b: float, c: float) -> float:
     """Value on `axis` of a sorted triple (a, b, c) that lies on axes (i, j, the other)."""
     return a if axis == i else (b if axis == j else c)
+
+
+@kernel
+def _excess(
+    plane: int, friction: float, s1: float, s2: float, s3: float, ucs: float, tension: float
+) -> float:
+    """How far a stress lies beyond a plane [Pa]; 0 for no plane (-1)."""
+    if plane < 0:
+        return 0.0
+    if plane < SHEAR_PLANES:
+        n1, n2, n3 = _flow(plane, friction)
+        return n1 * s1 + n2 * s2 + n3 * s3 - ucs
+    return (s3 if plane == 3 else (s2 if plane == 4 else s1)) - tension
+
+
+@kernel
+def _share(first: int, second: int, third: int, plane: int, a: float, b: float, c: float) -> float:
+    """Multiplier of `plane` in a set of three planes with multipliers a, b, c."""
+    if plane == first:
+        return a
+    if plane == second:
+        return b
+    return c if plane == third else 0.0
 
 
 @kernel
@@ -255,50 +268,41 @@ def return_to_yield(
     tension : float [Pa]
         Tensile strength, at most `ucs` / (N - 1).
     """
-    i, j, k = _rank(radial, hoop, axial)
-    low = min(radial, hoop, axial)
-    high = max(radial, hoop, axial)
-    mid = _on_axis(j, 0, 1, radial, hoop, axial)
-    excess = (
-        model.friction * high - low - ucs,
-        model.friction * mid - low - ucs,
-        model.friction * high - mid - ucs,
-        high - tension,
-        mid - tension,
-        low - tension,
-    )
+    size, inverse = model.size, model.inverse
+    friction, lame, twice_shear = model.friction, model.lame, model.twice_shear
+    i, j = _rank(radial, hoop, axial)
+    low, high = min(radial, hoop, axial), max(radial, hoop, axial)
+    mid = radial if j == 0 else (hoop if j == 1 else axial)
     tolerance = TOLERANCE * (abs(low) + abs(high) + ucs)
-    for s in range(model.size.size):
-        n = model.size[s]
-        if n == 0:
+    least = -tolerance / model.stiffness
+    for s in range(size.size):
+        if size[s] == 0:
             continue
-        s1, s2, s3 = low, mid, high
-        p1 = p2 = p3 = t1 = t2 = t3 = shear = 0.0
-        feasible = True
-        for row in range(n):
-            amount = 0.0
-            for column in range(n):
-                amount += model.inverse[s, row, column] * excess[model.sets[s, column]]
-            if amount < -tolerance / model.stiffness:
-                feasible = False
-                break
-            plane = model.sets[s, row]
-            s1 -= amount * model.correction[plane, 0]
-            s2 -= amount * model.correction[plane, 1]
-            s3 -= amount * model.correction[plane, 2]
-            if plane < SHEAR_PLANES:
-                shear += amount
-                p1 += amount * model.flow[plane, 0]
-                p2 += amount * model.flow[plane, 1]
-                p3 += amount * model.flow[plane, 2]
-            else:
-                t1 += amount * model.flow[plane, 0]
-                t2 += amount * model.flow[plane, 1]
-                t3 += amount * model.flow[plane, 2]
-        if feasible and _admissible(model.friction, s1, s2, s3, ucs, tension, tolerance):
-            return _unsorted(i, j, s1, s2, s3, p1, p2, p3, t1, t2, t3, shear, False)
-    bulk = (model.correction[3, 0] * 2.0 + model.correction[3, 2]) / 3.0
-    spread = (radial + hoop + axial - 3.0 * tension) / (9.0 * bulk)
+        first, second, third = _SETS[s, 0], _SETS[s, 1], _SETS[s, 2]
+        e1 = _excess(first, friction, low, mid, high, ucs, tension)
+        e2 = _excess(second, friction, low, mid, high, ucs, tension)
+        e3 = _excess(third, friction, low, mid, high, ucs, tension)
+        a = inverse[s, 0, 0] * e1 + inverse[s, 0, 1] * e2 + inverse[s, 0, 2] * e3
+        b = inverse[s, 1, 0] * e1 + inverse[s, 1, 1] * e2 + inverse[s, 1, 2] * e3
+        c = inverse[s, 2, 0] * e1 + inverse[s, 2, 1] * e2 + inverse[s, 2, 2] * e3
+        if a < least or b < least or c < least:
+            continue
+        l13 = _share(first, second, third, 0, a, b, c)
+        l12 = _share(first, second, third, 1, a, b, c)
+        l23 = _share(first, second, third, 2, a, b, c)
+        p1, p2, p3 = -l13 - l12, model.dilation * l12 - l23, model.dilation * (l13 + l23)
+        t1 = _share(first, second, third, 5, a, b, c)
+        t2 = _share(first, second, third, 4, a, b, c)
+        t3 = _share(first, second, third, 3, a, b, c)
+        volume = lame * (p1 + p2 + p3 + t1 + t2 + t3)
+        s1 = low - volume - twice_shear * (p1 + t1)
+        s2 = mid - volume - twice_shear * (p2 + t2)
+        s3 = high - volume - twice_shear * (p3 + t3)
+        if _admissible(friction, s1, s2, s3, ucs, tension, tolerance):
+            return _unsorted(
+                i, j, s1, s2, s3, p1, p2, p3, t1, t2, t3, l13 + l12 + l23, False
+            )
+    spread = (radial + hoop + axial - 3.0 * tension) / (3.0 * (3.0 * lame + twice_shear))
     return _unsorted(
         i, j, tension, tension, tension, 0.0, 0.0, 0.0, spread, spread, spread, 0.0, True
     )

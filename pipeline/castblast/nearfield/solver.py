@@ -196,7 +196,6 @@ def _material(rock: Rock, settings: NearFieldSettings) -> Material:
         bool(settings.tension == TensionMode.BRITTLE),
         float(settings.quadratic_viscosity),
         float(settings.linear_viscosity),
-        False,
     )
 
 
