@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from castblast.muckpile.bench import Bench, block_shape, crest_position
 from castblast.muckpile.particles import Particles
-from castblast.report.style import BLUE, GREEN, GREY, ORANGE, RED, new_figure, save_figure
+from castblast.report.style import BLUE, GREEN, GREY, ORANGE, RED, in_style, new_figure, save_figure
 
 if TYPE_CHECKING:
     from castblast.muckpile.profile import Profile
@@ -28,6 +28,7 @@ _GREY = (0.62, 0.62, 0.62, 1.0)
 _INK = "#222222"
 _WIDTH = 10.0
 _MARGIN = 0.03
+_SHOWN = 0.997  # share of the balls that a picture has to hold; single far rollers stretch it
 
 
 def block_colours(block: NDArray[np.int64], bench: Bench) -> _Colours:
@@ -74,8 +75,8 @@ def _edges(colours: _Colours) -> _Colours:
     return edges
 
 
-def _row_legend(axes: Any, bench: Bench) -> None:
-    """Name some rows by their colours, and the lines that carry a label."""
+def _legend(figure: Any, axes: Any, bench: Bench) -> None:
+    """Name some rows by their colours, and the lines of `axes` that carry a label."""
     rows, _ = block_shape(bench)
     shown = range(rows) if rows <= 4 else sorted({0, rows // 3, 2 * rows // 3, rows - 1})
     palette = _row_palette(rows)
@@ -84,21 +85,32 @@ def _row_legend(axes: Any, bench: Bench) -> None:
         Patch(color=palette[i], label=names.get(i, f"row {i + 1}")) for i in shown
     ]
     handles += axes.get_legend_handles_labels()[0]
-    axes.legend(handles=handles, loc="upper right", ncols=len(handles), handlelength=1.0)
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), handlelength=1.4)
+
+
+def _outside(balls: Particles, **limits: tuple[float, float]) -> str:
+    """Say how many balls a picture leaves out; empty if none."""
+    seen = np.ones(balls.radius.size, dtype=bool)
+    for name, (low, high) in limits.items():
+        along = balls.position[:, "xyz".index(name)]
+        seen &= (along >= low) & (along <= high)
+    left_out = int((~seen).sum())
+    return f" ({left_out:,} of {seen.size:,} balls lie outside the picture)" if left_out else ""
 
 
 def _extent(before: Particles, after: Particles, axis: int) -> tuple[float, float]:
-    """Range that holds nearly all balls of both states; single far rollers are left out."""
+    """Range that holds nearly all balls of both states."""
     low, high = np.inf, -np.inf
     for balls in (before, after):
         along = balls.position[:, axis]
         radius = float(balls.radius.max())
-        low = min(low, float(np.quantile(along, 0.0005)) - radius)
-        high = max(high, float(np.quantile(along, 0.9995)) + radius)
+        low = min(low, float(np.quantile(along, 1.0 - _SHOWN)) - radius)
+        high = max(high, float(np.quantile(along, _SHOWN)) + radius)
     pad = _MARGIN * (high - low)
     return low - pad, high + pad
 
 
+@in_style
 def draw_section(
     path: Path,
     before: Particles,
@@ -124,8 +136,8 @@ def draw_section(
     slope : (toe x [m], angle [rad]), optional
     """
     low, high = _extent(before, after, 0)
-    top = 1.18 * max(bench.height, float(np.quantile(after.position[:, 2], 0.9995)))
-    height = 2.0 * (_WIDTH - 0.8) * (top * 1.06) / (high - low) + 1.5
+    top = 1.18 * max(bench.height, float(np.quantile(after.position[:, 2], _SHOWN)))
+    height = 2.0 * (_WIDTH - 0.8) * (top * 1.06) / (high - low) + 1.6
     figure, axes = new_figure(2, 1, width=_WIDTH, height=min(max(height, 3.4), 9.0), sharex=True)
     for panel, balls, title in (
         (axes[0], before, f"Before, section at y = {y:.1f} m"),
@@ -145,9 +157,9 @@ def draw_section(
         panel.set_aspect("equal")
     _draw_outline(axes[1], bench)
     axes[1].plot(mean_profile.x, mean_profile.height, color=RED, lw=1.4, label="mean surface")
-    axes[1].legend(loc="upper right")
     axes[1].set_xlabel("x [m], in front of the toe of the face")
-    _row_legend(axes[0], bench)
+    axes[1].set_title("After" + _outside(after, x=(low, high)))
+    _legend(figure, axes[1], bench)
     return save_figure(figure, path, dpi=180)
 
 
@@ -180,6 +192,7 @@ def _draw_outline(axes: Any, bench: Bench) -> None:
     )
 
 
+@in_style
 def draw_plan(path: Path, before: Particles, after: Particles, bench: Bench) -> Path:
     """Draw bench and muckpile from above, each ball in the colour of its block.
 
@@ -216,7 +229,8 @@ def draw_plan(path: Path, before: Particles, after: Particles, bench: Bench) -> 
     names = {"x": "x [m], direction of throw", "y": "y [m], along the bench"}
     figure.supxlabel(names["x" if beside else "y"], fontsize=9)
     figure.supylabel(names["y" if beside else "x"], fontsize=9)
-    _row_legend(axes[0], bench)
+    axes[1].set_title("After" + _outside(after, x=(x_low, x_high), y=(y_low, y_high)))
+    _legend(figure, axes[0], bench)
     return save_figure(figure, path, dpi=180)
 
 
@@ -235,7 +249,7 @@ def _seen_from_above(balls: Particles) -> NDArray[np.int64]:
 def _plan_height(across: float, *, beside: bool) -> float:
     inner = _WIDTH - 0.8
     height = 0.5 * inner * across if beside else 2.0 * inner / across
-    return min(max(height + 1.0, 3.0), 11.0)
+    return min(max(height + 1.1, 3.0), 11.0)
 
 
 def _draw_face(axes: Any, bench: Bench, *, beside: bool) -> None:
@@ -244,6 +258,7 @@ def _draw_face(axes: Any, bench: Bench, *, beside: bool) -> None:
     axes.plot(first, second, color=RED, lw=1.2, label="toe of the face")
 
 
+@in_style
 def draw_energy(path: Path, history: CastHistory) -> Path:
     """Draw kinetic energies and the movement of the centre of mass over time.
 
