@@ -187,3 +187,27 @@ def test_faults_of_all_specs_at_once(tmp_path: Path) -> None:
         read_model_specs([tmp_path / "a.yaml", tmp_path / "b.yaml"])
     assert "a.yaml: kind" in str(fault.value)
     assert "b.yaml: no such file" in str(fault.value)
+
+
+def test_refinement_goes_on_where_the_solver_stopped(table) -> None:
+    """Rounds with enlarged targets lower the training loss and leave a plain network behind."""
+    spec = QUICK.model_copy(update={"max_iterations": 1500, "restarts": 1})
+    plain = fit_spec(spec, table)
+    refined = fit_spec(spec.model_copy(update={"refinements": 1}), table)
+    assert refined.restart.iterations > plain.restart.iterations
+    train = table.rows("train")
+    losses = [
+        np.mean((np.log(fit.predicted[train] / table.targets[train])) ** 2)
+        for fit in (plain, refined)
+    ]
+    assert losses[1] < losses[0]
+    found = evaluate(
+        refined.network,
+        {name: table.frame[name].to_numpy() for name in table.feature_names},
+        list(table.frame["explosive"]),
+    )
+    np.testing.assert_allclose(
+        found["burden_velocity"],
+        refined.predicted[:, table.target_names.index("burden_velocity")],
+        rtol=1e-12,
+    )

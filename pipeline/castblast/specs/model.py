@@ -96,9 +96,13 @@ class MlpSpec(SurrogateSpec):
     penalty : float
         L2 penalty on the weights (``alpha`` of scikit-learn).
     max_iterations : int
-        Bound on L-BFGS iterations; reaching it is recorded, not an error.
+        Bound on L-BFGS iterations of each round; reaching it is recorded, not an error.
     tolerance : float
         Change of loss or gradient at which L-BFGS stops.
+    refinements : int
+        Further rounds from the weights found, in each of which the solver sees the scaled targets
+        ten times larger. L-BFGS as scikit-learn calls it also stops when the loss falls by less
+        than 2.2e-9, an absolute bound that ends the first round early.
     restarts : int
         Fits from different random weights; the best on the validation rows is kept.
     seed : int
@@ -111,6 +115,7 @@ class MlpSpec(SurrogateSpec):
     penalty: float = Field(0.0, ge=0.0)
     max_iterations: int = Field(5000, ge=1)
     tolerance: float = Field(1e-7, gt=0.0)
+    refinements: int = Field(0, ge=0, le=4)
     restarts: int = Field(1, ge=1, le=100)
     seed: int = Field(0, ge=0, lt=2**31)
 

@@ -7,6 +7,7 @@ in SI and the column ``explosive``, and gives the targets in SI.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import Any
@@ -98,6 +99,57 @@ def _model(spec: ModelSpec, seed: int) -> Any:
     return Ridge(alpha=spec.penalty)
 
 
+def fit_estimator(estimator: Any, spec: ModelSpec, frame: Any, targets: Floats) -> tuple[int, bool]:
+    """Fit in place on one BLAS thread: with such small matrices a second one slows the fit down.
+
+    Parameters
+    ----------
+    estimator
+        From `make_estimator`.
+    spec : ModelSpec
+    frame : pandas.DataFrame
+        Numeric features [SI] and ``explosive``.
+    targets : (n, m) [SI]
+
+    Returns
+    -------
+    iterations : int
+        Of all rounds; 0 for a solver without any.
+    converged : bool
+        The last round ended by a rule of the solver, not at a limit.
+    """
+    from sklearn.exceptions import ConvergenceWarning
+    from threadpoolctl import threadpool_limits
+
+    with warnings.catch_warnings(record=True) as caught, threadpool_limits(1):
+        warnings.simplefilter("always")
+        estimator.fit(frame, targets)
+        model = estimator.regressor_["model"]
+        total = int(getattr(model, "n_iter_", 0) or 0)
+        if isinstance(spec, MlpSpec) and spec.refinements:
+            features = estimator.regressor_["columns"].transform(frame)
+            scaled = estimator.transformer_.transform(targets)
+            for round_ in range(1, spec.refinements + 1):
+                caught.clear()
+                total += _refine(model, features, scaled, 10.0**round_)
+    return total, not any(issubclass(entry.category, ConvergenceWarning) for entry in caught)
+
+
+def _refine(model: Any, features: Floats, scaled: Floats, spread: float) -> int:
+    """Go on from the weights of `model` with targets `spread` times as large; iterations taken.
+
+    The last layer is linear, so scaling it scales the outputs; it is scaled back at the end.
+    """
+    model.set_params(warm_start=True)
+    model.coefs_[-1] *= spread
+    model.intercepts_[-1] *= spread
+    model.fit(features, spread * scaled)
+    model.coefs_[-1] /= spread
+    model.intercepts_[-1] /= spread
+    model.set_params(warm_start=False)
+    return int(model.n_iter_)
+
+
 def predict(estimator: Any, frame: Any) -> Floats:
     """Evaluate a fitted estimator: (n, m) in SI, on one BLAS thread."""
     from threadpoolctl import threadpool_limits
@@ -105,11 +157,6 @@ def predict(estimator: Any, frame: Any) -> Floats:
     with threadpool_limits(1):
         values = np.asarray(estimator.predict(frame), dtype=np.float64)
     return values.reshape(len(frame), -1)
-
-
-def iterations(estimator: Any) -> int:
-    """Iterations of the solver; 0 where there are none."""
-    return int(getattr(estimator.regressor_["model"], "n_iter_", 0) or 0)
 
 
 def is_exportable(spec: ModelSpec) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -153,23 +152,16 @@ def fit_spec(spec: ModelSpec, table: Table, progress: ProgressCallback = silent)
 
 def _run(spec: ModelSpec, table: Table, seed: int) -> tuple[Any, Restart, Floats]:
     """One fit from one seed, with its predictions for every row."""
-    from sklearn.exceptions import ConvergenceWarning
-    from threadpoolctl import threadpool_limits
-
     train, valid = table.rows("train"), table.rows("valid")
     estimator = estimators.make_estimator(spec, table.explosives, seed)
-    # One thread: with these small matrices a second one makes the fit two to three times slower.
-    with warnings.catch_warnings(record=True) as caught, threadpool_limits(1):
-        warnings.simplefilter("always")
-        estimator.fit(table.frame.iloc[train], table.targets[train])
-    converged = not any(issubclass(entry.category, ConvergenceWarning) for entry in caught)
+    iterations, converged = estimators.fit_estimator(
+        estimator, spec, table.frame.iloc[train], table.targets[train]
+    )
     predicted = estimators.predict(estimator, table.frame)
     scores = score_targets(table.targets[valid], predicted[valid], table.target_names)
     error = summary_error(scores)
     # A fit that blew up must never win.
-    restart = Restart(
-        seed, error if np.isfinite(error) else np.inf, estimators.iterations(estimator), converged
-    )
+    restart = Restart(seed, error if np.isfinite(error) else np.inf, iterations, converged)
     return estimator, restart, predicted
 
 
