@@ -226,9 +226,10 @@ def draw_plan(path: Path, before: Particles, after: Particles, bench: Bench) -> 
         limits = {"x": (x_low, x_high), "y": (y_low, y_high)}
         across_name, up_name = ("x", "y") if beside else ("y", "x")
         panel.set(xlim=limits[across_name], ylim=limits[up_name])
-    names = {"x": "x [m], direction of throw", "y": "y [m], along the bench"}
-    figure.supxlabel(names["x" if beside else "y"], fontsize=9)
-    figure.supylabel(names["y" if beside else "x"], fontsize=9)
+    thrown, along = "x [m], direction of throw", "y [m], along the bench"
+    for panel in axes:
+        panel.set(xlabel=thrown if beside else along, ylabel=along if beside else thrown)
+        panel.label_outer()
     axes[1].set_title("After" + _outside(after, x=(x_low, x_high), y=(y_low, y_high)))
     _legend(figure, axes[0], bench)
     return save_figure(figure, path, dpi=180)
