@@ -35,7 +35,7 @@ RECIPE = {
         "bench_height": "10 m",
     },
     "solver": {"history_points": 6},
-    "shard_size": 7,
+    "shard_size": 12,
     "max_failed_share": 0.0,
 }
 

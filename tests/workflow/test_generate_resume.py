@@ -14,6 +14,9 @@ from fake_blast import fake_generate, fake_simulator, write_recipe
 from castblast.dataset.store import open_dataset
 from castblast.errors import SimulationError, SpecError
 
+#: Shards of the small recipe: 60 rows, 12 to a shard.
+SHARDS = 5
+
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory):
@@ -36,9 +39,9 @@ def half_built(tmp_path):
     recipe = write_recipe(tmp_path / "r.yaml")
     with pytest.raises(RuntimeError, match="broke down"):
         fake_generate(
-            recipe, tmp_path / "data.nc", simulator=fake_simulator(recipe, break_at=4), workers=1
+            recipe, tmp_path / "data.nc", simulator=fake_simulator(recipe, break_at=2), workers=1
         )
-    assert 0 < len(shards(tmp_path)) < 9
+    assert 0 < len(shards(tmp_path)) < SHARDS
     assert not (tmp_path / "data.nc").exists()
     return recipe
 
@@ -78,7 +81,7 @@ def test_goes_on_after_a_breakdown(tmp_path, undisturbed):
     recipe = half_built(tmp_path)
     valid = len(shards(tmp_path))
     outcome = fake_generate(recipe, tmp_path / "data.nc")
-    assert outcome.lines[0] == f"resume: {valid} of 9 shards valid, {9 - valid} to do"
+    assert outcome.lines[0] == f"resume: {valid} of {SHARDS} shards valid, {SHARDS - valid} to do"
     assert contents(tmp_path) == undisturbed
 
 
@@ -105,7 +108,7 @@ def test_damaged_shards_are_made_again(tmp_path, undisturbed, damage):
             fake_generate(
                 fake_recipe,
                 other / "data.nc",
-                simulator=fake_simulator(fake_recipe, break_at=4),
+                simulator=fake_simulator(fake_recipe, break_at=2),
                 workers=1,
             )
         first.write_bytes(shards(other)[0].read_bytes())
@@ -148,11 +151,11 @@ def stop_when_half_done(folder, recipe, how):
         env=environment,
     )
     deadline = time.monotonic() + 60
-    while len(shards(folder)) < 3 and time.monotonic() < deadline and process.poll() is None:
+    while len(shards(folder)) < 2 and time.monotonic() < deadline and process.poll() is None:
         time.sleep(0.02)
     process.send_signal(how)
     _, errors = process.communicate(timeout=60)
-    assert 3 <= len(shards(folder)) < 9, errors
+    assert 2 <= len(shards(folder)) < SHARDS, errors
     assert not (folder / "data.nc").exists()
     return errors
 
@@ -238,7 +241,7 @@ def test_too_many_failed_samples(tmp_path):
     write_recipe(recipe, max_failed_share=1.0)
     broken = fake_simulator(recipe, break_at=0)
     outcome = fake_generate(recipe, tmp_path / "data.nc", simulator=broken)
-    assert "9 of 9 shards valid" in outcome.lines[0]
+    assert f"{SHARDS} of {SHARDS} shards valid" in outcome.lines[0]
     assert "not_converged" in outcome.lines[1]
 
 
@@ -255,7 +258,7 @@ def test_progress_counts_rows_rate_and_failures(tmp_path):
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
     running = [line for _, line in seen if "samples/s" in line]
-    assert len(running) == 9
+    assert len(running) == SHARDS
     assert running[-1].startswith("60/60 failed 13 ")
     assert running[-1].endswith("ETA 0:00:00")
 
