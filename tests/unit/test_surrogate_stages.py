@@ -225,3 +225,13 @@ def test_bad_datasets_are_refused(source, toy_dataset, tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match=r"bad\.nc: ucs: the dataset has no such variable"):
         train(tmp_path / "bad.nc", source[1], tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_lines_say_from_how_many_rows_the_paper_is_met(source, tmp_path: Path) -> None:
+    """The power law meets the toy's hole radius at once, but R² of its velocity stays short."""
+    outcome = train(source[0], [source[1][1]], tmp_path / "out")
+    (line,) = [line for line in outcome.lines if line.startswith("second: ")]
+    figures = outcome.document["league"][0]["targets"]["burden_velocity"]
+    met = figures["meets_paper_r2"] and figures["meets_paper_error"]
+    assert ("are met from" in line) is met
+    assert outcome.rows[-1][0] == "paper"

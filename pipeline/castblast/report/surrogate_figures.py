@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from math import floor
 from pathlib import Path
 from typing import Any
 
@@ -93,7 +94,7 @@ def draw_figure_two(
     figure, axes = new_figure(2, 2, width=9.4, height=7.6)
     _draw_learning(axes[0, 0], lines, target, marks)
     _draw_histogram(axes[0, 1], rows, target, marks)
-    _draw_parity(axes[1, 0], rows, target)
+    _draw_parity(axes[1, 0], rows, target, "c) ")
     _draw_by_explosive(axes[1, 1], rows, marks)
     figure.suptitle(title, fontsize=11)
     return save_figure(figure, path)
@@ -180,8 +181,9 @@ def _draw_histogram(axis: Any, rows: HeldOutRows, target: str, marks: Mapping[st
     )
 
 
-def _draw_parity(axis: Any, rows: HeldOutRows, target: str) -> None:
+def _draw_parity(axis: Any, rows: HeldOutRows, target: str, letter: str = "") -> None:
     variable = VARIABLES[target]
+    # R² is cut, not rounded: a model that misses is never shown as 1.
     truth = rows.truth[target] * variable.display_factor
     predicted = rows.predicted[target] * variable.display_factor
     ends = [float(min(truth.min(), predicted.min())), float(max(truth.max(), predicted.max()))]
@@ -192,10 +194,9 @@ def _draw_parity(axis: Any, rows: HeldOutRows, target: str) -> None:
                      label=_words(str(kind)), rasterized=True)  # fmt: skip
     figures = rows.scores[target]
     axis.text(
-        0.98, 0.04, f"R² {figures['r2']:.5f}\n95 % within {figures['relative_error_95']:.2%}",
+        0.98, 0.04, f"R² {floor(figures['r2'] * 1e5) / 1e5:.5f}\n95 % within {figures['relative_error_95']:.2%}",
         transform=axis.transAxes, ha="right", va="bottom", fontsize=8,
     )  # fmt: skip
-    letter = "c) " if target == "burden_velocity" else ""
     axis.set(
         title=f"{letter}{_words(target)[0].upper()}{_words(target)[1:]}",
         xlabel=f"simulated [{variable.shown_unit}]",

@@ -7,8 +7,9 @@ paths, so that a second run gives the same bytes.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from math import floor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -54,7 +55,8 @@ def train(
     dataset : path
         NetCDF written by `castblast generate`.
     specs : sequence of path
-        Model specs (YAML); none: the reference. The first gets the learning curve.
+        Model specs (YAML); none: the reference. The first and the
+        chosen one get a learning curve.
     out : path, optional
         Folder for ``comparison.json`` and one folder per fit; default ``data/fits/<dataset>``.
     tracking : bool
@@ -83,15 +85,20 @@ def train(
         for number, spec in enumerate(chosen_specs)
     ]
     comparison = compare(fits)
-    curve = learning_curve(fits[0], table, progress=_part(progress, parts - 1, parts))
+    curves = {
+        fit.spec.name: learning_curve(fit, table, progress=_part(progress, parts - 1, parts))
+        for number, fit in enumerate(fits)
+        if number == 0 or fit.spec.name == comparison["chosen"]
+    }
     files = [_write_json(out / "comparison.json", comparison)]
     for fit in fits:
         files += _write_fit(out / fit.spec.name, fit)
-    files += _write_curve(out / fits[0].spec.name, fits[0], curve)
+        if fit.spec.name in curves:
+            files += _write_curve(out / fit.spec.name, fit, curves[fit.spec.name])
     tracker = MlflowTracker(runs) if tracking else NullTracker()
     tracker.record(fits, comparison, files)
     progress(1.0, "trained")
-    return _outcome(comparison, out, curve)
+    return _outcome(comparison, out, curves)
 
 
 def _read(dataset: Any, specs: Sequence[ModelSpec], path: Path) -> Table:
@@ -184,14 +191,16 @@ def _held_out(fit: Fit) -> HeldOutRows:
     )
 
 
-def _outcome(comparison: dict[str, Any], out: Path, curve: Sequence[LearningPoint]) -> TrainOutcome:
+def _outcome(
+    comparison: dict[str, Any], out: Path, curves: Mapping[str, Sequence[LearningPoint]]
+) -> TrainOutcome:
     targets, paper = comparison["targets"], comparison["paper"]
     header = ["model", "rows", *(f"{name.replace('_', ' ')}: R², 95 %" for name in targets)]
-    train_rows = f"{curve[-1].rows:,}"
+    train_rows = f"{next(iter(curves.values()))[-1].rows:,}"
     rows = []
     for entry in comparison["league"]:
         cells = [
-            f"{_number(figures['r2'], '.5f')}, {_number(figures['relative_error_95'], '.2%')}"
+            f"{_r_squared(figures['r2'])}, {_share(figures['relative_error_95'])}"
             for figures in entry["targets"].values()
         ]
         mark = " *" if entry["name"] == comparison["chosen"] else ""
@@ -200,22 +209,34 @@ def _outcome(comparison: dict[str, Any], out: Path, curve: Sequence[LearningPoin
     rows.append(
         ["paper", f"{paper['runs']:,}", *(mark if t == paper["target"] else "" for t in targets)]
     )
-    lines = [f"* chosen: {comparison['rule']}", *_matching(curve, paper), f"wrote {out}"]
+    lines = [f"* chosen: {comparison['rule']}", f"wrote {out}"]
+    lines[1:1] = [line for name, curve in curves.items() for line in _matching(name, curve, paper)]
     title = f"{comparison['test_rows']:,} test rows never trained on"
     return TrainOutcome({**comparison, "out": str(out)}, title, header, rows, lines)
 
 
-def _number(value: float | None, form: str) -> str:
-    return "-" if value is None else format(value, form)
+def _r_squared(value: float | None) -> str:
+    # Cut, not rounded: a model that misses is never shown as 1.
+    return "-" if value is None else f"{floor(value * 1e5) / 1e5:.5f}"
 
 
-def _matching(curve: Sequence[LearningPoint], paper: dict[str, Any]) -> list[str]:
-    """Say from how many training rows on the first model meets the published figures."""
+def _share(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2%}"
+
+
+def _matching(name: str, curve: Sequence[LearningPoint], paper: dict[str, Any]) -> list[str]:
+    """Say from how many training rows on a model meets the published figures on test rows."""
     target = paper["target"]
     if target not in curve[-1].test:
         return []
-    for point in curve:
-        found = point.test[target]
-        if found.r2 >= paper["r2"] and found.relative_error_95 <= paper["relative_error_95"]:
-            return [f"the published figures are met from {point.rows:,} training rows on"]
-    return [f"the published figures are not met with {curve[-1].rows:,} training rows"]
+    met = [
+        point.test[target].r2 >= paper["r2"]
+        and point.test[target].relative_error_95 <= paper["relative_error_95"]
+        for point in curve
+    ]
+    if not met[-1]:
+        return [f"{name}: the published figures are not met with {curve[-1].rows:,} training rows"]
+    since = len(met) - 1
+    while since > 0 and met[since - 1]:
+        since -= 1
+    return [f"{name}: the published figures are met from {curve[since].rows:,} training rows on"]
