@@ -1,6 +1,8 @@
 """Files: whole or not at all, equal bytes every time, one clear line when they are unreadable."""
 
 import os
+import subprocess
+import sys
 import time
 
 import netCDF4
@@ -85,6 +87,28 @@ def test_a_failed_write_leaves_nothing(file, tmp_path):
     dataset["bad"].attrs["attribute"] = {"a": 1}
     with pytest.raises((TypeError, ValueError)):
         write_dataset(dataset, tmp_path / "data.nc")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(os.name == "nt", reason="limits of POSIX")
+def test_full_disk_is_one_line_and_leaves_nothing(file, tmp_path):
+    """A limit on the size of files stands in for a full disk."""
+    code = (
+        "import resource, signal, sys; from pathlib import Path\n"
+        "from castblast.dataset.store import open_dataset, write_dataset\n"
+        "from castblast.errors import DatasetError\n"
+        "dataset = open_dataset(Path(sys.argv[1]))\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, 30_000))\n"
+        "try:\n    write_dataset(dataset, Path(sys.argv[2]))\n"
+        "except DatasetError as fault:\n    print(fault)\n"
+    )
+    target = tmp_path / "data.nc"
+    done = subprocess.run(
+        [sys.executable, "-c", code, file, target], capture_output=True, text=True, check=True
+    )
+    assert f"{target}: cannot be written" in done.stdout
+    assert len(done.stdout.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
 
 

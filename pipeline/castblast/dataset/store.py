@@ -44,8 +44,8 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> Path:
 
     try:
         return write_with(path, write)
-    except OSError as fault:
-        message = f"{path}: cannot be written: {fault.strerror or fault}"
+    except (OSError, RuntimeError) as fault:  # a full disk is a RuntimeError of HDF5
+        message = f"{path}: cannot be written (is the disk full?): {_short(fault)}"
         raise DatasetError(message) from None
 
 
