@@ -192,9 +192,9 @@ def _draw_parity(axis: Any, rows: HeldOutRows, target: str, letter: str = "") ->
         own = rows.explosive == kind
         axis.scatter(truth[own], predicted[own], s=5, linewidths=0, alpha=0.6, color=colour,
                      label=_words(str(kind)), rasterized=True)  # fmt: skip
-    figures = rows.scores[target]
+    r2, error = (rows.scores[target][name] for name in ("r2", "relative_error_95"))
     axis.text(
-        0.98, 0.04, f"R² {floor(figures['r2'] * 1e5) / 1e5:.5f}\n95 % within {figures['relative_error_95']:.2%}",
+        0.98, 0.04, f"R² {floor(r2 * 1e5) / 1e5:.5f}\n95 % within {error:.2%}",
         transform=axis.transAxes, ha="right", va="bottom", fontsize=8,
     )  # fmt: skip
     axis.set(
