@@ -56,6 +56,8 @@ LEDGER_SIZE = 6
 
 #: The linear viscosity acts over at least this share of the radius, on however fine a mesh.
 VISCOUS_LENGTH = 0.04
+#: Largest strain of a zone in one step; the work of a step is right to its square.
+STRAIN_STEP = 0.01
 
 
 class Material(NamedTuple):
@@ -224,6 +226,8 @@ def update_zones(
     areas, tensions, history = body.initial_area, body.tension, body.history
     lame, shear2 = model.lame, model.twice_shear
     limit = np.inf
+    fastest = 0.0
+    per_second = 1.0 / dt
     fallbacks = 0
     force[: active + 1] = 0.0
     for j in range(active):
@@ -237,6 +241,7 @@ def update_zones(
         volume_strain = radial_strain + hoop_strain
         widths[j], means[j] = width, mean
         swelling = width * mean / area
+        shrinking = 1.0 / swelling
         # Elastic trial; the return keeps it where it is admissible.
         tau_r = radial[j] + lame * volume_strain + shear2 * radial_strain
         tau_h = hoop[j] + lame * volume_strain + shear2 * hoop_strain
@@ -269,13 +274,15 @@ def update_zones(
                 fallbacks += 1
         radial[j], hoop[j], axial[j] = tau_r, tau_h, tau_a
         # Tangent of the Kirchhoff law seen by the nodes: radial compression stiffens it.
-        speed = np.sqrt((model.stiffness + abs(tau_r)) / material.density)
-        rate = -volume_strain / dt
+        modulus = model.stiffness + abs(tau_r)
+        transit = width * np.sqrt(material.density / modulus)
+        rate = -volume_strain * per_second
         damping = material.linear_viscosity * max(1.0, VISCOUS_LENGTH * mean / width)
         if rate > 0.0:
-            damping += material.quadratic_viscosity * width * rate / speed
-        pressure = material.density / swelling * width * speed * damping * rate
-        limit = min(limit, width / speed * (np.sqrt(1.0 + damping * damping) - damping))
+            damping += material.quadratic_viscosity * transit * rate
+        pressure = modulus * transit * damping * rate * shrinking
+        limit = min(limit, transit * (np.sqrt(1.0 + damping * damping) - damping))
+        fastest = max(fastest, abs(radial_strain), abs(hoop_strain))
         # Work of q on the exact change of area, split as the two half kicks of the nodes see it.
         d_width, d_mean = width - old_width, mean - old_mean
         work[VISCOUS] -= 0.5 * (
@@ -283,10 +290,12 @@ def update_zones(
             + pressure * (mean * d_width + width * d_mean)
         )
         viscous[j] = pressure
-        through = (tau_r / swelling - pressure) * mean
-        around = 0.5 * (tau_h / swelling - pressure) * width
+        through = (tau_r * shrinking - pressure) * mean
+        around = 0.5 * (tau_h * shrinking - pressure) * width
         force[j] += through - around
         force[j + 1] -= through + around
+    if fastest * limit > STRAIN_STEP * dt:
+        limit = STRAIN_STEP * dt / fastest
     return limit, fallbacks
 
 

@@ -55,6 +55,7 @@ _SETS = np.array(
     ],
     dtype=np.int64,
 )
+_FIRST_EDGE = 2
 #: Tolerance of admissibility over the stress scale of a trial.
 TOLERANCE = 1e-10
 
@@ -70,6 +71,8 @@ class YieldModel(NamedTuple):
         Elastic constants lambda and 2 G.
     stiffness : float [Pa]
         lambda + 2 G.
+    shear_compliance : float [1/Pa]
+        Multiplier per excess stress on the plane (1, 3) alone.
     size : int array (11,)
         Planes in each active set of `_SETS`; 0 if the set is singular for this material.
     inverse : array (11, 3, 3) [1/Pa]
@@ -81,6 +84,7 @@ class YieldModel(NamedTuple):
     lame: float
     twice_shear: float
     stiffness: float
+    shear_compliance: float
     size: IntArray
     inverse: FloatArray
 
@@ -207,7 +211,7 @@ def make_yield_model(
         if _invert(matrix, n, inverse[s]):
             size[s] = n
     return YieldModel(
-        friction, dilation, lame, twice_shear, lame + twice_shear, size, inverse
+        friction, dilation, lame, twice_shear, lame + twice_shear, inverse[0, 0, 0], size, inverse
     )
 
 
@@ -268,14 +272,39 @@ def return_to_yield(
     tension : float [Pa]
         Tensile strength, at most `ucs` / (N - 1).
     """
-    size, inverse = model.size, model.inverse
     friction, lame, twice_shear = model.friction, model.lame, model.twice_shear
     i, j = _rank(radial, hoop, axial)
     low, high = min(radial, hoop, axial), max(radial, hoop, axial)
     mid = radial if j == 0 else (hoop if j == 1 else axial)
     tolerance = TOLERANCE * (abs(low) + abs(high) + ucs)
     least = -tolerance / model.stiffness
-    for s in range(size.size):
+    # Sets of one plane are nearly all the returns of a run: no search for them.
+    a = model.shear_compliance * (friction * high - low - ucs)
+    if a >= least:
+        volume = lame * (model.dilation - 1.0) * a
+        s1, s2 = low - volume + twice_shear * a, mid - volume
+        s3 = high - volume - twice_shear * model.dilation * a
+        if _admissible(friction, s1, s2, s3, ucs, tension, tolerance):
+            p1, p3 = -a, model.dilation * a
+            return _unsorted(i, j, s1, s2, s3, p1, 0.0, p3, 0.0, 0.0, 0.0, a, False)
+    a = (high - tension) / model.stiffness
+    if a >= least:
+        s1, s2 = low - lame * a, mid - lame * a
+        if _admissible(friction, s1, s2, tension, ucs, tension, tolerance):
+            return _unsorted(i, j, s1, s2, tension, 0.0, 0.0, 0.0, 0.0, 0.0, a, 0.0, False)
+    return _search(model, i, j, low, mid, high, ucs, tension, tolerance)
+
+
+@kernel
+def _search(
+    model: YieldModel, i: int, j: int, low: float, mid: float, high: float, ucs: float,
+    tension: float, tolerance: float,
+) -> ReturnedStress:  # fmt: skip
+    """Edges and corners: try the active sets of two and three planes on sorted stresses."""
+    size, inverse = model.size, model.inverse
+    friction, lame, twice_shear = model.friction, model.lame, model.twice_shear
+    least = -tolerance / model.stiffness
+    for s in range(_FIRST_EDGE, size.size):
         if size[s] == 0:
             continue
         first, second, third = _SETS[s, 0], _SETS[s, 1], _SETS[s, 2]
@@ -302,7 +331,7 @@ def return_to_yield(
             return _unsorted(
                 i, j, s1, s2, s3, p1, p2, p3, t1, t2, t3, l13 + l12 + l23, False
             )
-    spread = (radial + hoop + axial - 3.0 * tension) / (3.0 * (3.0 * lame + twice_shear))
+    spread = (low + mid + high - 3.0 * tension) / (3.0 * (3.0 * lame + twice_shear))
     return _unsorted(
         i, j, tension, tension, tension, 0.0, 0.0, 0.0, spread, spread, spread, 0.0, True
     )
