@@ -218,6 +218,6 @@ def _draw_by_explosive(axis: Any, rows: HeldOutRows, marks: Mapping[str, float])
     axis.invert_yaxis()
     axis.grid(visible=False, axis="y")
     axis.set(
-        title="d) By target and explosive (colours of c), test rows",
-        xlabel="95 % of relative errors below [%]",
+        title="d) By target and explosive, test rows",
+        xlabel="95 % of relative errors below [%]; colours as in c)",
     )
