@@ -18,10 +18,14 @@ from castblast.errors import SpecError, Status, nearest_name
 from castblast.explosive.isentrope import Explosive, in_hole_velocity
 from castblast.nearfield.case import EndMode, Hole, NearFieldSettings, Rock, TensionMode
 from castblast.nearfield.solver import NearFieldResult, solve_near_field
-from castblast.variables import BURDEN_PARAMETER_SETS, INPUTS, OUTPUT_NAMES, VARIABLES
+from castblast.variables import (
+    BURDEN_PARAMETER_SETS,
+    INPUTS,
+    OUTPUT_NAMES,
+    STEMMING_RATIO,
+    VARIABLES,
+)
 
-#: Stemming length over burden where neither stemming nor charge length is given.
-STEMMING_RATIO = 0.7
 #: The near field is a slice across a long charge. A charge shorter than this many diameters acts
 #: as a concentrated one (Lang 1976, after Livingston), which the model does not describe.
 COLUMN_CHARGE_DIAMETERS = 6.0

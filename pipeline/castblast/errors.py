@@ -51,6 +51,10 @@ class SpecError(CastblastError):
     exit_code = 2
 
 
+class StaleResultError(SpecError):
+    """Results of an earlier run that were made from something else stand in the way."""
+
+
 class DatasetError(CastblastError):
     """A dataset that is missing, truncated or of another kind than expected (exit code 2)."""
 

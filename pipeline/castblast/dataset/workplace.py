@@ -14,7 +14,7 @@ from typing import Any
 
 from castblast.dataset.provenance import differences
 from castblast.dataset.store import read_file, require_writable
-from castblast.errors import DatasetError, SpecError
+from castblast.errors import DatasetError, SpecError, StaleResultError
 from castblast.files import write_text
 
 _NOTE = "made_from.json"
@@ -33,7 +33,9 @@ def is_finished(path: Path, origin: Mapping[str, Any]) -> bool:
     Raises
     ------
     SpecError
-        Another dataset or something else has that name.
+        Something else has that name.
+    StaleResultError
+        A dataset that was made from something else has that name.
     """
     if not path.exists():
         return False
@@ -48,7 +50,7 @@ def is_finished(path: Path, origin: Mapping[str, Any]) -> bool:
         message = f"{path}: is not a dataset of castblast; choose another name with --out"
         raise SpecError(message) from None
     if old != origin:
-        raise SpecError(_stale(path, old, origin))
+        raise StaleResultError(_stale(path, old, origin))
     return True
 
 
@@ -57,7 +59,7 @@ def open_work_folder(path: Path, origin: Mapping[str, Any], *, restart: bool) ->
 
     Raises
     ------
-    SpecError
+    StaleResultError
         The shards were made from something else; the difference and the ways on are named.
     DatasetError
         The folder cannot be written to.
@@ -68,7 +70,7 @@ def open_work_folder(path: Path, origin: Mapping[str, Any], *, restart: bool) ->
     require_writable(folder)
     old = _read_note(folder / _NOTE)
     if old and old != origin:
-        raise SpecError(_stale(folder, old, origin))
+        raise StaleResultError(_stale(folder, old, origin))
     write_text(folder / _NOTE, json.dumps(dict(origin), indent=1, sort_keys=True) + "\n")
     return folder
 
