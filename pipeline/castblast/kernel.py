@@ -77,7 +77,7 @@ def _compile(function: Callable[_P, _R], *, parallel: bool) -> Callable[_P, _R]:
     import numba
 
     # An earlier import of numba has read its settings already.
-    numba.config.CACHE_DIR = folder  # type: ignore[attr-defined]
+    numba.config.CACHE_DIR = folder
     options: dict[str, Any] = {
         "nogil": True,
         "cache": True,

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from castblast.dataset.design import Design
 from castblast.dataset.provenance import ExplosiveSource, global_attributes
@@ -76,7 +77,7 @@ def _labels(
     explosives: tuple[ExplosiveSource, ...], design: Design, results: BatchResult
 ) -> dict[str, Any]:
     names = tuple(entry.name for entry in explosives)
-    values = {
+    values: dict[str, NDArray[Any]] = {
         "explosive": design.explosive,
         "split": design.split,
         "status": results.status,

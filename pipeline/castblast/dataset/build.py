@@ -67,7 +67,7 @@ def build_shards(
         _warm(todo[0])
         begin = time.perf_counter()
         for report in _reports(client, todo):
-            fresh += report.count
+            fresh += report.rows
             failed += report.failed
             rate = fresh / (time.perf_counter() - begin)
             line = _progress_line(finished + fresh, total, failed, rate)

@@ -47,12 +47,13 @@ def require_success(
     found = causes(status)
     lines = [f"  {count} {cause.name.lower()}: {cause.meaning}" for cause, count in found]
     rank = {cause: number for number, (cause, _) in enumerate(found)}
-    for i in sorted(failed.tolist(), key=lambda i: (rank[Status(status[i])], i))[:_SHOWN]:
+    kinds = [Status(int(code)) for code in status]
+    for i in sorted(failed.tolist(), key=lambda i: (rank[kinds[i]], i))[:_SHOWN]:
         shown = ", ".join(
             f"{spec.name} {VARIABLES[spec.name].show(float(design.columns[spec.name][i]))}"
             for spec in recipe.sampled
         )
-        cause = Status(status[i]).name.lower()
+        cause = kinds[i].name.lower()
         lines.append(
             f"  sample {design.sample[i]}, {cause}: {explosives[design.explosive[i]]}, {shown}"
         )

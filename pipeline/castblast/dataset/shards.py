@@ -61,8 +61,8 @@ class ShardTask:
 class ShardReport(NamedTuple):
     """What a worker sends home: a few numbers, the rows are on disk."""
 
-    index: int
-    count: int
+    shard: int
+    rows: int
     failed: int
     seconds: float
 

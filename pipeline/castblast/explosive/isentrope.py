@@ -186,7 +186,7 @@ def pressure(isentrope: ProductIsentrope, relative_volume: float) -> float:
     if x >= isentrope.log_volume[last]:
         line = isentrope.log_slope[last] * (x - isentrope.log_volume[last])
         return float(np.exp(isentrope.log_pressure[last] + line))
-    i = np.searchsorted(isentrope.log_volume, x, side="right") - 1
+    i = int(np.searchsorted(isentrope.log_volume, x, side="right")) - 1
     return float(np.exp(_log_pressure(isentrope, i, x)))
 
 
@@ -206,7 +206,7 @@ def slope(isentrope: ProductIsentrope, relative_volume: float) -> float:
         return float(-isentrope.log_slope[0])
     if x >= isentrope.log_volume[last]:
         return float(-isentrope.log_slope[last])
-    i = np.searchsorted(isentrope.log_volume, x, side="right") - 1
+    i = int(np.searchsorted(isentrope.log_volume, x, side="right")) - 1
     return -_log_pressure_slope(isentrope, i, x)
 
 
@@ -223,11 +223,12 @@ def energy(isentrope: ProductIsentrope, relative_volume: float) -> float:
     x = np.log(relative_volume)
     last = isentrope.log_volume.size - 1
     if x <= isentrope.log_volume[0]:
-        return isentrope.energy[0] - _end_work(isentrope, 0, x)
+        return float(isentrope.energy[0]) - _end_work(isentrope, 0, x)
     if x >= isentrope.log_volume[last]:
-        return isentrope.energy[last] - _end_work(isentrope, last, x)
-    i = np.searchsorted(isentrope.log_volume, x, side="right") - 1
-    return isentrope.energy[i + 1] + _interval_work(isentrope, i, x, isentrope.log_volume[i + 1])
+        return float(isentrope.energy[last]) - _end_work(isentrope, last, x)
+    i = int(np.searchsorted(isentrope.log_volume, x, side="right")) - 1
+    rest = _interval_work(isentrope, i, x, isentrope.log_volume[i + 1])
+    return float(isentrope.energy[i + 1]) + rest
 
 
 @kernel
@@ -256,4 +257,4 @@ def in_hole_velocity(explosive: Explosive, hole_diameter: float) -> float:
     model (Wood & Kirkwood 1954); never below 0.4 D_CJ, where that model has no steady solution.
     """
     deficit = explosive.diameter_coefficient * (0.1 / hole_diameter) ** explosive.diameter_exponent
-    return explosive.detonation_velocity * (1.0 - min(deficit, 0.6))
+    return float(explosive.detonation_velocity * (1.0 - min(deficit, 0.6)))
