@@ -58,6 +58,9 @@ class ContactLaw(NamedTuple):
     dashpot_mode : DashpotMode
     density : float [kg m-3]
         Density of the balls.
+    cap_on_total : bool
+        The limits of slip and rolling ask for the forces of springs and dashpots together, as in
+        LAMMPS and LIGGGHTS; False: for those of the springs alone, as in PFC.
     """
 
     effective_modulus: float = 1e7
@@ -68,6 +71,7 @@ class ContactLaw(NamedTuple):
     damping_shear: float = 0.2
     dashpot_mode: int = DashpotMode.NO_TENSION_SLIP_CUT
     density: float = 2600.0
+    cap_on_total: bool = False
 
 
 class Constants(NamedTuple):
@@ -85,6 +89,7 @@ class Constants(NamedTuple):
         Factor on 2 sqrt(m_c k_n), i.e. the shear damping times sqrt(shear_ratio).
     no_tension, slip_cut : bool
         The two rules of the dashpots.
+    cap_on_total : bool
     """
 
     modulus: float
@@ -96,6 +101,7 @@ class Constants(NamedTuple):
     no_tension: bool
     slip_cut: bool
     density: float
+    cap_on_total: bool
 
 
 def law_constants(law: ContactLaw) -> Constants:
@@ -112,6 +118,7 @@ def law_constants(law: ContactLaw) -> Constants:
         mode in (DashpotMode.NO_TENSION, DashpotMode.NO_TENSION_SLIP_CUT),
         mode in (DashpotMode.SLIP_CUT, DashpotMode.NO_TENSION_SLIP_CUT),
         float(law.density),
+        bool(law.cap_on_total),
     )
 
 
@@ -223,30 +230,30 @@ def contact_force(
     vn = slide[0] * nx + slide[1] * ny + slide[2] * nz
     vx, vy, vz = slide[0] - vn * nx, slide[1] - vn * ny, slide[2] - vn * nz
 
-    force = _follow(memory[p, 0], memory[p, 1], memory[p, 2], normal, spin * step)
-    force, slip_work, slips = _grow(force, (vx, vy, vz), ks, step, friction * fn)
-    fx, fy, fz = force
-    memory[p, 0], memory[p, 1], memory[p, 2] = fx, fy, fz
-
-    wn = roll[0] * nx + roll[1] * ny + roll[2] * nz
-    bend = (roll[0] - wn * nx, roll[1] - wn * ny, roll[2] - wn * nz)
-    moment = _follow(memory[p, 3], memory[p, 4], memory[p, 5], normal, spin * step)
-    moment, roll_work, _ = _grow(
-        moment,
-        bend,
-        ks * effective_radius * effective_radius,
-        step,
-        rolling_friction * effective_radius * fn,
-    )
-    memory[p, 3], memory[p, 4], memory[p, 5] = moment
-
     # vn < 0 while the partners approach.
     push = -law.damping_normal * memory[p, 7] * vn
     if law.no_tension and fn + push < 0.0:
         push = -fn
     drag = law.damping_shear * memory[p, 7]
-    if law.slip_cut and slips:
+    grip, hidden = fn, 0.0
+    if law.cap_on_total:
+        grip, hidden = max(fn + push, 0.0), drag
+
+    force = _follow(memory[p, 0], memory[p, 1], memory[p, 2], normal, spin * step)
+    force, slip_work, slips = _grow(force, (vx, vy, vz), ks, step, friction * grip, hidden)
+    fx, fy, fz = force
+    memory[p, 0], memory[p, 1], memory[p, 2] = fx, fy, fz
+    if slips and law.slip_cut and not law.cap_on_total:
         drag = 0.0
+
+    wn = roll[0] * nx + roll[1] * ny + roll[2] * nz
+    bend = (roll[0] - wn * nx, roll[1] - wn * ny, roll[2] - wn * nz)
+    kr = ks * effective_radius * effective_radius
+    limit = rolling_friction * effective_radius * grip
+    moment = _follow(memory[p, 3], memory[p, 4], memory[p, 5], normal, spin * step)
+    moment, roll_work, _ = _grow(moment, bend, kr, step, limit, 0.0)
+    memory[p, 3], memory[p, 4], memory[p, 5] = moment
+
     dx, dy, dz = push * nx - drag * vx, push * ny - drag * vy, push * nz - drag * vz
     if len(dash) > 0:
         # Half of the work of the force before and half of the force now, over the same path: the
@@ -299,24 +306,27 @@ def forget_contact(
 
 @kernel
 def _grow(
-    force: Vector, rate: Vector, stiffness: float, step: float, limit: float
+    force: Vector, rate: Vector, stiffness: float, step: float, limit: float, drag: float
 ) -> tuple[Vector, float, bool]:
     """Let a spring force grow by -stiffness rate dt up to `limit`.
 
-    Returns the force, the slip work [J] and whether it slips. The work is the mean of the force
+    With a `drag` the limit holds for the sum of the spring and a dashpot -drag rate. Returns the
+    force of the spring, the slip work [J] and whether it slips. The work is the mean of the force
     before and after, times the path that the spring did not take up.
     """
-    x = force[0] - stiffness * step * rate[0]
-    y = force[1] - stiffness * step * rate[1]
-    z = force[2] - stiffness * step * rate[2]
+    x = force[0] - (stiffness * step + drag) * rate[0]
+    y = force[1] - (stiffness * step + drag) * rate[1]
+    z = force[2] - (stiffness * step + drag) * rate[2]
     square = x * x + y * y + z * z
-    if square <= limit * limit:
-        return (x, y, z), 0.0, False
-    length = sqrt(square)
-    cut = limit / length
-    before = (force[0] * x + force[1] * y + force[2] * z) / length
-    slip_work = 0.5 * (before + limit) * (length - limit) / stiffness
-    return (x * cut, y * cut, z * cut), slip_work, True
+    slips = square > limit * limit
+    slip_work = 0.0
+    if slips:
+        length = sqrt(square)
+        before = (force[0] * x + force[1] * y + force[2] * z) / length
+        slip_work = 0.5 * (before + limit) * (length - limit) / stiffness
+        cut = limit / length
+        x, y, z = x * cut, y * cut, z * cut
+    return (x + drag * rate[0], y + drag * rate[1], z + drag * rate[2]), slip_work, slips
 
 
 @kernel
@@ -345,9 +355,9 @@ def spring_energy(
     memory: FloatArray, p: int, overlap: float, effective_radius: float, shear_ratio: float
 ) -> float:
     """Elastic energy [J] of contact `p`: normal, shear and rolling spring."""
-    kn = memory[p, 6]
-    shear = memory[p, 0] ** 2 + memory[p, 1] ** 2 + memory[p, 2] ** 2
-    moment = memory[p, 3] ** 2 + memory[p, 4] ** 2 + memory[p, 5] ** 2
+    kn = float(memory[p, 6])
+    shear = float(memory[p, 0] ** 2 + memory[p, 1] ** 2 + memory[p, 2] ** 2)
+    moment = float(memory[p, 3] ** 2 + memory[p, 4] ** 2 + memory[p, 5] ** 2)
     bent = shear + moment / (effective_radius * effective_radius)
     return 0.5 * (kn * overlap * overlap + bent / (kn * shear_ratio))
 

@@ -422,9 +422,9 @@ def _add_stiffness(
 @kernel
 def survey(
     balls: Balls, pairs: Contacts, touches: Contacts, walls: Walls, law: Constants
-) -> tuple[float, float, int]:
-    """Elastic energy [J], largest overlap over the smaller radius, number of ball contacts."""
-    energy, largest, contacts = 0.0, 0.0, 0
+) -> tuple[float, float, float, int]:
+    """Elastic energy [J], largest overlap over radius, sum of overlaps [m], contacts of balls."""
+    energy, largest, total, contacts = 0.0, 0.0, 0.0, 0
     place = balls.place
     for i in range(len(place)):
         radius = place[i, 3]
@@ -439,6 +439,7 @@ def survey(
                 effective = radius * place[j, 3] / radii
                 energy += spring_energy(pairs.memory, p, overlap, effective, law.shear_ratio)
                 largest = max(largest, overlap / min(radius, place[j, 3]))
+                total += overlap
                 contacts += 1
         for p in range(touches.start[i], touches.start[i + 1]):
             if touches.touching[p]:
@@ -448,4 +449,4 @@ def survey(
                 overlap = radius - distance
                 energy += spring_energy(touches.memory, p, overlap, radius, law.shear_ratio)
                 largest = max(largest, overlap / radius)
-    return energy, largest, contacts
+    return energy, largest, total, contacts

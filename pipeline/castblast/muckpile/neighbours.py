@@ -95,7 +95,10 @@ def make_grid(lower: FloatArray, upper: FloatArray, cell: float, count: int) -> 
             break
         size *= 1.25
     per = shape / extent
-    return Grid(*map(float, lower), *map(float, per), *map(int, shape))
+    x, y, z = map(float, lower)
+    per_x, per_y, per_z = map(float, per)
+    nx, ny, nz = map(int, shape)
+    return Grid(x, y, z, per_x, per_y, per_z, nx, ny, nz)
 
 
 @kernel
@@ -143,7 +146,7 @@ def _approach(balls: Balls, i: int, j: int, horizon: float) -> float:
         dx += vx * time
         dy += vy * time
         dz += vz * time
-    return dx * dx + dy * dy + dz * dz
+    return float(dx * dx + dy * dy + dz * dz)
 
 
 @kernel

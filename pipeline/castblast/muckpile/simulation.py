@@ -146,7 +146,13 @@ class Simulation:
     def survey(self) -> tuple[float, float, int]:
         """Elastic energy [J], largest overlap over radius, number of contacts between balls."""
         found = survey(self._balls, self._pairs, self._touches, self._walls, self._law)
-        return float(found[0]), float(found[1]), int(found[2])
+        return float(found[0]), float(found[1]), int(found[3])
+
+    def mean_overlap(self) -> float:
+        """Mean overlap of touching balls over the mean radius."""
+        found = survey(self._balls, self._pairs, self._touches, self._walls, self._law)
+        mean_radius = float(np.mean(self.particles.radius))
+        return float(found[2]) / max(int(found[3]), 1) / mean_radius
 
     def translational_energy(self) -> float:
         """Kinetic energy [J] of the motion of the centres."""
@@ -162,10 +168,9 @@ class Simulation:
         self._balls.motion[mask, 7] = 0.0
         self._stale = True
 
-    def release(self, factor: float = 0.0) -> None:
+    def slow(self, factor: float) -> None:
         """Multiply all velocities and spins by `factor`."""
         self._balls.motion[:, 0:6] *= factor
-        self._stale = True
 
     def run(self, until: float, event: float) -> bool:
         """Step to the first end of a step at or after `until` [s], or exactly to `event` [s].
@@ -181,8 +186,9 @@ class Simulation:
                     return False
                 self._choose_step(event)
             under_way = int(self._pending >= 0.0)
-            to_event = ceil((event - self.clock) / self._step - 1e-6)
-            to_until = ceil((until - self.clock) / self._step - 1e-6)
+            # No end in sight (an infinite event) is as good as a far one.
+            to_event = ceil(min((event - self.clock) / self._step, 1e9) - 1e-6)
+            to_until = ceil(min((until - self.clock) / self._step, 1e9) - 1e-6)
             goal = max(1, min(to_event, to_until) + under_way)
             ended, begun, self._pending = advance(
                 self._balls,
@@ -250,7 +256,10 @@ class Simulation:
         order, cell_start, slab = sort_by_cell(middle, grid)
         reference = np.column_stack([balls.place[:, 0:3], velocity])
         self._balls = Balls(
-            *(part[order] for part in (balls.place, balls.motion, balls.force, reference)),
+            balls.place[order],
+            balls.motion[order],
+            balls.force[order],
+            reference[order],
             balls.identity[order],
         )
         shape = (self._balls, cell_start, grid, self.skin, life)

@@ -202,7 +202,7 @@ class _Record:
 
     def __init__(self, case: CastCase) -> None:
         self.case = case
-        self.rows: list[tuple[float, float, float, float, float, float, int]] = []
+        self.rows: list[tuple[float, ...]] = []
         self.largest_energy = 0.0
         self.largest_overlap = 0.0
         self.quiet_since = inf
@@ -241,10 +241,14 @@ class _Record:
 
     def history(self) -> CastHistory:
         """Return the samples as arrays."""
-        table = np.array([row[:6] for row in self.rows], dtype=np.float64)
-        contacts = np.array([row[6] for row in self.rows], dtype=np.int64)
-        columns = (np.ascontiguousarray(table[:, k]) for k in range(3))
-        return CastHistory(*columns, np.ascontiguousarray(table[:, 3:6]), contacts)
+        table = np.array(self.rows, dtype=np.float64)
+        return CastHistory(
+            table[:, 0].copy(),
+            table[:, 1].copy(),
+            table[:, 2].copy(),
+            table[:, 3:6].copy(),
+            table[:, 6].astype(np.int64),
+        )
 
 
 def check_case(case: CastCase) -> list[str]:
@@ -408,9 +412,18 @@ def _close_ledger(
 ) -> EnergyLedger:
     kinetic, potential, spring = _mechanical_energy(case, run)
     spent = run.dissipated if case.keep_ledger else np.full(3, nan)
+    slip, rolling_slip, dashpot = map(float, spent)
     before = sum(initial)
-    open_balance = before + fired - kinetic - potential - spring - float(spent.sum())
+    open_balance = before + fired - kinetic - potential - spring - (slip + rolling_slip + dashpot)
     scale = max(abs(fired), abs(initial[1] - potential), initial[0], 1e-300)
     return EnergyLedger(
-        before, fired, kinetic, potential, spring, *map(float, spent), open_balance / scale
+        before,
+        fired,
+        kinetic,
+        potential,
+        spring,
+        slip,
+        rolling_slip,
+        dashpot,
+        open_balance / scale,
     )

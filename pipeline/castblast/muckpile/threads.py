@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 import numba
+
+# A thread that waits for the others at the end of a pass must not burn the core that one of them
+# needs: on a busy machine the default of libgomp makes a run ten times slower. Read when the
+# first parallel kernel starts; whoever sets it outside is obeyed.
+os.environ.setdefault("GOMP_SPINCOUNT", "2000")
 
 
 @contextmanager

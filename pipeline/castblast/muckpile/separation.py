@@ -1,0 +1,145 @@
+"""Push overlapping balls apart, pair by pair, without forces or time.
+
+Each pair is moved apart by its overlap, half each, in the order of the cells, sweep after sweep
+(Gauss-Seidel), and every ball is put back inside the planes. Below the density of random close
+packing this ends without overlaps. It replaces the growth of radii (Lubachevsky and Stillinger
+1990), which needs many more sweeps.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from castblast.kernel import kernel
+from castblast.muckpile.neighbours import (
+    Balls,
+    count_partners,
+    fill_partners,
+    make_grid,
+    sort_by_cell,
+    starts,
+)
+from castblast.muckpile.particles import FloatArray, IntArray
+from castblast.muckpile.walls import Walls
+from castblast.progress import ProgressCallback, silent
+
+#: Over the mean radius: skin of the pair list.
+_SKIN = 0.4
+
+
+def push_apart(
+    position: FloatArray,
+    radius: FloatArray,
+    planes: Walls,
+    tolerance: float = 0.01,
+    most_sweeps: int = 2000,
+    progress: ProgressCallback = silent,
+) -> FloatArray:
+    """Return centres (n, 3) [m] without overlaps of more than `tolerance` mean radii.
+
+    Parameters
+    ----------
+    position, radius : array (n, 3), (n,) [m]
+    planes : Walls
+        Only their endless planes are used; all balls end in front of them.
+    tolerance : float [-]
+    most_sweeps : int
+        What is reached by then is returned.
+    progress : callable
+    """
+    mean = float(np.mean(radius))
+    place = np.column_stack([position, radius])
+    identity = np.arange(len(radius))
+    sweeps, overlap = 0, np.inf
+    while sweeps < most_sweeps and overlap > tolerance * mean:
+        point = np.ascontiguousarray(place[:, 0:3])
+        cell = 2.0 * float(radius.max()) + _SKIN * mean
+        grid = make_grid(point.min(axis=0), point.max(axis=0), cell, len(point))
+        order, cell_start, _ = sort_by_cell(point, grid)
+        place, identity = place[order], identity[order]
+        shape = (_as_balls(place, identity), cell_start, grid, _SKIN * mean, 0.0)
+        start = starts(count_partners(*shape))
+        partner = np.empty(int(start[-1]), dtype=np.int32)
+        fill_partners(*shape, start, partner)
+        done, overlap = _sweep(
+            place,
+            start,
+            partner,
+            planes.origin,
+            planes.normal,
+            0.5 * _SKIN * mean,
+            tolerance * mean,
+            most_sweeps - sweeps,
+        )
+        sweeps += done
+        share = min(0.99, sweeps / most_sweeps)
+        progress(share, f"packing: overlaps up to {100.0 * overlap / mean:.0f} % of the radius")
+    back = np.empty((len(radius), 3))
+    back[identity] = place[:, 0:3]
+    return back
+
+
+def _as_balls(place: FloatArray, identity: IntArray) -> Balls:
+    """Wrap resting centres for the neighbour search, which reads places and references only."""
+    count = len(place)
+    reference = np.zeros((count, 6))
+    reference[:, 0:3] = place[:, 0:3]
+    return Balls(place, np.zeros((count, 8)), np.zeros((count, 8)), reference, identity)
+
+
+@kernel
+def _sweep(
+    place: FloatArray,
+    start: IntArray,
+    partner: NDArray[np.int32],
+    origin: FloatArray,
+    normal: FloatArray,
+    allowed: float,
+    tolerance: float,
+    most: int,
+) -> tuple[int, float]:
+    """Sweep until a ball has moved by `allowed`; return the sweeps and the largest overlap [m]."""
+    first = place.copy()
+    largest = np.inf
+    for sweep in range(most):
+        largest, way = 0.0, 0.0
+        for i in range(len(place)):
+            for p in range(start[i], start[i + 1]):
+                j = partner[p]
+                dx = place[j, 0] - place[i, 0]
+                dy = place[j, 1] - place[i, 1]
+                dz = place[j, 2] - place[i, 2]
+                radii = place[i, 3] + place[j, 3]
+                square = dx * dx + dy * dy + dz * dz
+                if square < radii * radii:
+                    distance = sqrt(square)
+                    overlap = radii - distance
+                    largest = max(largest, overlap)
+                    # Two coincident centres part along z.
+                    part = 0.5 * overlap / max(distance, 1e-12)
+                    dz = max(dz, 1e-12) if distance < 1e-12 else dz
+                    place[i, 0] -= part * dx
+                    place[i, 1] -= part * dy
+                    place[i, 2] -= part * dz
+                    place[j, 0] += part * dx
+                    place[j, 1] += part * dy
+                    place[j, 2] += part * dz
+        for i in range(len(place)):
+            for k in range(len(origin)):
+                depth = place[i, 3]
+                for axis in range(3):
+                    depth -= (place[i, axis] - origin[k, axis]) * normal[k, axis]
+                if depth > 0.0:
+                    largest = max(largest, depth)
+                    for axis in range(3):
+                        place[i, axis] += depth * normal[k, axis]
+            moved = 0.0
+            for axis in range(3):
+                moved += (place[i, axis] - first[i, axis]) ** 2
+            way = max(way, moved)
+        if largest <= tolerance or way > allowed * allowed:
+            return sweep + 1, largest
+    return most, largest
