@@ -30,7 +30,7 @@ from castblast.nearfield.lagrangian import (
     make_body,
     update_zones,
 )
-from castblast.nearfield.mohr_coulomb import YieldModel, make_yield_model
+from castblast.nearfield.mohr_coulomb import make_yield_model
 
 _OK = int(Status.OK)
 _NOT_CONVERGED = int(Status.NOT_CONVERGED)
@@ -156,9 +156,12 @@ def wall_pressure(load: WallLoad, time: float, radius: float) -> float:
 
 @kernel
 def _kick(body: Body, active: int, dt: float, case: Annulus, work: FloatArray) -> None:
-    """Advance the velocities by `dt`; the outer node feels its boundary."""
+    """Advance the velocities by `dt`; the outer node feels its boundary.
+
+    The node at the edge of the active zones rests: the force of the next zone is not known there.
+    """
     last = case.zones
-    for i in range(min(active + 1, last)):
+    for i in range(active):
         body.velocity[i] += dt * body.force[i] / body.mass[i]
     if active < last:
         return
@@ -233,8 +236,11 @@ def march(case: Annulus) -> March:
         if finished:
             dt = end - time
         _kick(body, active, 0.5 * (previous + dt), case, work)
+        if active < case.zones and abs(body.velocity[active - 1]) > _AT_REST * wave_speed:
+            active += 1
         old_radius = body.radius[0]
-        for i in range(active + 1):
+        moving = active + 1 if active == case.zones else active
+        for i in range(moving):
             body.radius[i] += dt * body.velocity[i]
         time += dt
         steps += 1
@@ -265,8 +271,6 @@ def march(case: Annulus) -> March:
             status = _OK
             break
         dt = min(STEP_GROWTH * dt, case.courant * limit)
-        while active < case.zones and abs(body.velocity[active]) > _AT_REST * wave_speed:
-            active += 1
     return March(
         status, body, record[: steps + 1].copy(), work, reversal, last_speed, 0.5 * previous,
         steps, fallbacks,

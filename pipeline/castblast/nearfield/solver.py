@@ -57,7 +57,7 @@ SETTLED_VELOCITY = 1e-3
 LEDGER_TOLERANCE = 1e-3
 #: Share of the largest stable step.
 COURANT = 0.85
-_MAX_STEPS = 500_000
+_MAX_STEPS = 300_000
 
 
 class NearFieldResult(NamedTuple):
