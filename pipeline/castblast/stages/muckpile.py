@@ -131,7 +131,15 @@ def _speed(spec: BenchSpec) -> tuple[float, dict[str, Any] | None]:
 
 
 def _part(progress: ProgressCallback, low: float, high: float) -> ProgressCallback:
-    return lambda share, line: progress(low + share * (high - low), line)
+    """Progress of one part of the run; the share, an estimate there, never falls."""
+    reached = 0.0
+
+    def report(share: float, line: str) -> None:
+        nonlocal reached
+        reached = max(reached, share)
+        progress(low + reached * (high - low), line)
+
+    return report
 
 
 def _start(
