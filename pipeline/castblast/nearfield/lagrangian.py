@@ -25,9 +25,9 @@ belongs to the model: with sin(phi) > 1 - 2 nu the non-associated flow is unstab
 (Sandler & Rubin 1987) and refinement makes the answer worse. The instability oscillates, so the
 linear part must act in expansion as well as in compression; and only with a length that does not
 shrink with the zones is there a solution for the mesh to converge to. Measured on rock with
-phi 53 degrees, nu 0.25, UCS 11 MPa, E 24 GPa (120, 240 and 480 zones; equilibrium pressure in MPa):
-compression only, l = w: 51.7, 52.2, 53.3, diverging; both signs, l = max(w, 0.04 r), C_L 0.3: 54.96,
-54.97, 54.98. The length costs less than 0.1 percent in strong rock and about 1 percent in the
+phi 53 degrees, nu 0.25, UCS 11 MPa, E 24 GPa (120, 240, 480 zones; equilibrium pressure in MPa):
+compression only, l = w: 51.7, 52.2, 53.3, diverging; both signs, l = max(w, 0.04 r), C_L 0.3:
+54.96, 54.97, 54.98. The length costs less than 0.1 percent in strong rock and about 1 percent in the
 weakest (C_L 0.15 against 0.3). It is a share of the radius, so geometric similarity is kept.
 """
 
@@ -254,9 +254,7 @@ def update_zones(
             mean_r = 0.5 * area * (radial[j] + tau_r)
             mean_h = 0.5 * area * (hoop[j] + tau_h)
             mean_a = 0.5 * area * (axial[j] + tau_a)
-            work[SHEAR] += (
-                mean_r * s.shear_radial + mean_h * s.shear_hoop + mean_a * s.shear_axial
-            )
+            work[SHEAR] += mean_r * s.shear_radial + mean_h * s.shear_hoop + mean_a * s.shear_axial
             work[TENSION] += (
                 mean_r * s.tensile_radial + mean_h * s.tensile_hoop + mean_a * s.tensile_axial
             )

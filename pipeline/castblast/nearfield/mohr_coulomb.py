@@ -328,9 +328,7 @@ def _search(
         s2 = mid - volume - twice_shear * (p2 + t2)
         s3 = high - volume - twice_shear * (p3 + t3)
         if _admissible(friction, s1, s2, s3, ucs, tension, tolerance):
-            return _unsorted(
-                i, j, s1, s2, s3, p1, p2, p3, t1, t2, t3, l13 + l12 + l23, False
-            )
+            return _unsorted(i, j, s1, s2, s3, p1, p2, p3, t1, t2, t3, l13 + l12 + l23, False)
     spread = (low + mid + high - 3.0 * tension) / (3.0 * (3.0 * lame + twice_shear))
     return _unsorted(
         i, j, tension, tension, tension, 0.0, 0.0, 0.0, spread, spread, spread, 0.0, True

@@ -60,10 +60,10 @@ def last_time_outside(record: FloatArray, value: float, band: float) -> float:
         gap = abs(record[k, 1] - value)
         if gap > band:
             if k == record.shape[0] - 1:
-                return record[k, 0]
+                return float(record[k, 0])
             next_gap = abs(record[k + 1, 1] - value)
             share = (gap - band) / max(gap - next_gap, 1e-300)
-            return record[k, 0] + min(share, 1.0) * (record[k + 1, 0] - record[k, 0])
+            return float(record[k, 0] + min(share, 1.0) * (record[k + 1, 0] - record[k, 0]))
     return 0.0
 
 

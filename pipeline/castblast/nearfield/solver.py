@@ -2,12 +2,29 @@
 
 `solve_near_field` is a thin driver over one kernel that holds no interpreter lock; it never
 raises, a fault is a status.
+
+**End of the run.** `paper` mode stops at 0.9 of the travel time of the p-wave to an outer
+boundary at 5.5 m, wherever the wall then is: with large holes or weak rock it still moves, the
+result depends on the hole diameter and `settled` is false. `equilibrium` mode works on a body of
+1000 hole radii, detects the time t_rev at which the wall first turns back, runs on to 1.8 t_rev
+and takes the time mean of the hole *radius* over [1.3, 1.8] t_rev; the equilibrium pressure is
+the isentrope at that radius, so that the two are one state of the gas. All lengths and times
+scale with the hole, so neither hole diameter nor rock density changes the result (given a rise
+time in proportion). The end time is interpolated between steps: the result is smooth in every
+input (relative noise of the order of 1e-5).
+
+With a tensile strength of zero there is no final rest in an infinite body: the cracked zone
+keeps growing and the pressure falls slowly after the window, hardly in weak rock, by about one
+percent per doubling of time in strong and stiff rock. The window is then part of the definition.
+
+**Measured** (derived by this project, 24 random designs against 400 zones): pressure within
+0.3 percent, hole radius 0.1, crushed-zone radius 0.6, gas work 1.0, energy ledger 4e-4.
 """
 
 from __future__ import annotations
 
 from math import isfinite, pi, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -58,6 +75,7 @@ LEDGER_TOLERANCE = 1e-3
 #: Share of the largest stable step.
 COURANT = 0.85
 _MAX_STEPS = 300_000
+_MOST_DECOUPLED = 100.0
 
 
 class NearFieldResult(NamedTuple):
@@ -146,6 +164,7 @@ def solve_near_field(
     """
     if not _possible(explosive, rock, hole, settings):
         return _no_result(Status.BAD_INPUT, settings)
+    explosive = explosive._replace(isentrope=_plain(explosive.isentrope))
     start = (hole.diameter / hole.charge_diameter) ** 2
     if not inside_table(explosive.isentrope, start):
         return _no_result(Status.OUT_OF_ISENTROPE, settings)
@@ -159,7 +178,6 @@ def solve_near_field(
 
 def _possible(explosive: Explosive, rock: Rock, hole: Hole, settings: NearFieldSettings) -> bool:
     """Say whether the inputs describe a case at all."""
-    isentrope = explosive.isentrope
     numbers = (*rock, *hole, settings.outer_radius, settings.quadratic_viscosity,
                settings.linear_viscosity, explosive.total_energy)  # fmt: skip
     if not all(isfinite(x) for x in numbers):
@@ -172,7 +190,7 @@ def _possible(explosive: Explosive, rock: Rock, hole: Hole, settings: NearFieldS
         and 0.0 < rock.friction_angle < 0.5 * pi
         and 0.0 <= rock.dilation_angle <= rock.friction_angle
         and rock.tensile_strength >= 0.0
-        and 0.0 < hole.charge_diameter <= hole.diameter
+        and 0.0 < hole.charge_diameter <= hole.diameter <= _MOST_DECOUPLED * hole.charge_diameter
         and hole.rise_time >= 0.0
         and hole.in_situ_stress >= 0.0
         and (settings.outer_radius == 0.0 or settings.outer_radius > 0.5 * hole.diameter)
@@ -182,7 +200,7 @@ def _possible(explosive: Explosive, rock: Rock, hole: Hole, settings: NearFieldS
         and settings.history_points >= 2
         and settings.mode in tuple(EndMode)
         and settings.tension in tuple(TensionMode)
-        and 0.0 < pressure(isentrope, (hole.diameter / hole.charge_diameter) ** 2) < np.inf
+        and isfinite(sum(float(x) for x in explosive.isentrope[1:7]))
     )
 
 
@@ -202,24 +220,20 @@ def _material(rock: Rock, settings: NearFieldSettings) -> Material:
     )
 
 
-def _annulus(
-    explosive: Explosive, rock: Rock, hole: Hole, settings: NearFieldSettings
-) -> Annulus:
+def _annulus(explosive: Explosive, rock: Rock, hole: Hole, settings: NearFieldSettings) -> Annulus:
     """Set up the march of one hole; every number as float, for one signature of the kernel."""
     material = _material(rock, settings)
     inner = 0.5 * hole.diameter
     paper = settings.mode == EndMode.PAPER
     outer = settings.outer_radius or (PAPER_RADIUS if paper else EQUILIBRIUM_RADII * inner)
-    default, width = (
-        (PAPER_ZONES, PAPER_WIDTH) if paper else (EQUILIBRIUM_ZONES, EQUILIBRIUM_WIDTH)
-    )
+    default, width = (PAPER_ZONES, PAPER_WIDTH) if paper else (EQUILIBRIUM_ZONES, EQUILIBRIUM_WIDTH)
     zones = settings.zones or default
     wave_speed = sqrt(
         (material.bulk_modulus + 4.0 / 3.0 * material.shear_modulus) / material.density
     )
     load = WallLoad(
         True,
-        _plain(explosive.isentrope),
+        explosive.isentrope,
         0.5 * hole.charge_diameter,
         float(hole.in_situ_stress),
         0.0,
@@ -245,18 +259,20 @@ def _annulus(
 
 def _plain(isentrope: ProductIsentrope) -> ProductIsentrope:
     """The isentrope with the exact types of the compiled signature."""
-    return ProductIsentrope(
-        bool(isentrope.tabulated),
-        *(float(x) for x in isentrope[1:7]),
-        *(np.ascontiguousarray(x, dtype=np.float64) for x in isentrope[7:]),
-    )
+    scalars = {name: float(getattr(isentrope, name)) for name in isentrope._fields[1:7]}
+    arrays = {
+        name: np.ascontiguousarray(getattr(isentrope, name), dtype=np.float64)
+        for name in isentrope._fields[7:]
+    }
+    return isentrope._replace(tabulated=bool(isentrope.tabulated), **scalars, **arrays)
 
 
 def _result(
     explosive: Explosive, hole: Hole, settings: NearFieldSettings, case: Annulus, run: March
 ) -> NearFieldResult:
     """Read the end state off a finished march."""
-    record, work = run.record, 2.0 * pi * run.work
+    record = run.record
+    work = [2.0 * pi * float(w) for w in run.work]
     end = float(record[-1, 0])
     if settings.mode == EndMode.PAPER:
         radius = float(record[-1, 1])
@@ -274,11 +290,13 @@ def _result(
     charge = 0.25 * pi * hole.charge_diameter**2
     kinetic = 2.0 * pi * kinetic_energy(run.body, run.half_kick)
     initial = case.in_situ_stress**2 / (2.0 * case.material.bulk_modulus)
-    elastic = 2.0 * pi * (
-        elastic_energy(run.body, case.material) - initial * float(run.body.initial_area.sum())
+    elastic = (
+        2.0
+        * pi
+        * (elastic_energy(run.body, case.material) - initial * float(run.body.initial_area.sum()))
     )
     spent = kinetic + elastic + work[SHEAR] + work[TENSION] + work[VISCOUS] + work[BOUNDARY]
-    residual = (work[LOAD] - spent) / work[LOAD]
+    residual = (work[LOAD] - spent) / work[LOAD] if work[LOAD] != 0.0 else float("nan")
     status = Status.OK
     if run.fallbacks > 0:
         status = Status.RETURN_MAP_FAILED
@@ -299,13 +317,7 @@ def _no_result(status: Status, settings: NearFieldSettings) -> NearFieldResult:
     """A result that holds nothing but its status."""
     nan = float("nan")
     empty = np.full(max(settings.history_points, 2), nan)
-    values = [nan] * len(NearFieldResult._fields)
-    return NearFieldResult(*values)._replace(
-        status=int(status),
-        settled=False,
-        n_steps=0,
-        return_map_fallbacks=0,
-        history_time=empty,
-        history_pressure=empty.copy(),
-        history_radius=empty.copy(),
-    )
+    values: dict[str, Any] = dict.fromkeys(NearFieldResult._fields, nan)
+    values |= {"status": int(status), "settled": False, "n_steps": 0, "return_map_fallbacks": 0}
+    values |= {name: empty.copy() for name in NearFieldResult._fields[-3:]}
+    return NearFieldResult(**values)
