@@ -259,12 +259,13 @@ def _annulus(explosive: Explosive, rock: Rock, hole: Hole, settings: NearFieldSe
 
 def _plain(isentrope: ProductIsentrope) -> ProductIsentrope:
     """The isentrope with the exact types of the compiled signature."""
-    scalars = {name: float(getattr(isentrope, name)) for name in isentrope._fields[1:7]}
-    arrays = {
-        name: np.ascontiguousarray(getattr(isentrope, name), dtype=np.float64)
-        for name in isentrope._fields[7:]
-    }
-    return isentrope._replace(tabulated=bool(isentrope.tabulated), **scalars, **arrays)
+    i = isentrope
+    scalars = [float(x) for x in (i.a, i.b, i.c, i.r1, i.r2, i.omega)]
+    arrays = [
+        np.ascontiguousarray(x, dtype=np.float64)
+        for x in (i.log_volume, i.log_pressure, i.log_slope, i.energy)
+    ]
+    return ProductIsentrope(bool(i.tabulated), *scalars, *arrays)  # type: ignore[arg-type]
 
 
 def _result(
