@@ -72,7 +72,23 @@ def parallel_kernel(function: Callable[_P, _R]) -> Callable[_P, _R]:
     return _compile(function, parallel=True)
 
 
-def _compile(function: Callable[_P, _R], *, parallel: bool) -> Callable[_P, _R]:
+def inline_kernel(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Compile `function` into its callers, otherwise as `lean_kernel`: for innermost loops."""
+    return _compile(function, parallel=False, lean=True, inline=True)
+
+
+def lean_kernel(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Compile a `function` that makes no array and returns none, without counting references.
+
+    Numba counts the references to every array it takes out of a tuple or hands on; inside the
+    contact loop of the muckpile that is half of the time.
+    """
+    return _compile(function, parallel=False, lean=True)
+
+
+def _compile(
+    function: Callable[_P, _R], *, parallel: bool, lean: bool = False, inline: bool = False
+) -> Callable[_P, _R]:
     folder = _prepare_cache()
     import numba
 
@@ -83,5 +99,7 @@ def _compile(function: Callable[_P, _R], *, parallel: bool) -> Callable[_P, _R]:
         "cache": True,
         "error_model": "numpy",
         "parallel": parallel,
+        "forceinline": inline,
+        "_nrt": not lean,
     }
     return cast("Callable[_P, _R]", numba.njit(**options)(function))

@@ -21,7 +21,7 @@ from enum import IntEnum
 from math import pi, sqrt
 from typing import NamedTuple, TypeAlias
 
-from castblast.kernel import kernel
+from castblast.kernel import inline_kernel
 from castblast.muckpile.particles import FloatArray
 
 Vector: TypeAlias = tuple[float, float, float]
@@ -154,20 +154,20 @@ def check_law(law: ContactLaw) -> list[str]:
     return faults
 
 
-@kernel
+@inline_kernel
 def ball_stiffness(radius1: float, radius2: float, modulus: float) -> float:
     """Normal stiffness [N m-1] between two balls: A E*/L, A = pi min(R)^2, L = R1 + R2."""
     smaller = min(radius1, radius2)
     return pi * smaller * smaller * modulus / (radius1 + radius2)
 
 
-@kernel
+@inline_kernel
 def wall_stiffness(radius: float, modulus: float) -> float:
     """Normal stiffness [N m-1] between a ball and a wall: pi R E*."""
     return pi * radius * modulus
 
 
-@kernel
+@inline_kernel
 def contact_force(
     memory: FloatArray,
     dash: FloatArray,
@@ -273,7 +273,7 @@ def contact_force(
     return (fn * nx + fx + dx, fn * ny + fy + dy, fn * nz + fz + dz), moment
 
 
-@kernel
+@inline_kernel
 def forget_contact(
     memory: FloatArray,
     dash: FloatArray,
@@ -304,7 +304,7 @@ def forget_contact(
         memory[p, word] = 0.0
 
 
-@kernel
+@inline_kernel
 def _grow(
     force: Vector, rate: Vector, stiffness: float, step: float, limit: float, drag: float
 ) -> tuple[Vector, float, bool]:
@@ -329,7 +329,7 @@ def _grow(
     return (x + drag * rate[0], y + drag * rate[1], z + drag * rate[2]), slip_work, slips
 
 
-@kernel
+@inline_kernel
 def _follow(x: float, y: float, z: float, normal: Vector, angle: float) -> Vector:
     """Carry a tangential vector into the plane of `normal` and turn it by a small `angle`."""
     nx, ny, nz = normal
@@ -350,7 +350,7 @@ def _follow(x: float, y: float, z: float, normal: Vector, angle: float) -> Vecto
     return tx * scale, ty * scale, tz * scale
 
 
-@kernel
+@inline_kernel
 def spring_energy(
     memory: FloatArray, p: int, overlap: float, effective_radius: float, shear_ratio: float
 ) -> float:

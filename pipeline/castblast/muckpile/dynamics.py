@@ -15,8 +15,9 @@ from math import sqrt
 
 import numpy as np
 from numba import prange
+from numpy.typing import NDArray
 
-from castblast.kernel import kernel, parallel_kernel
+from castblast.kernel import inline_kernel, kernel, lean_kernel, parallel_kernel
 from castblast.muckpile.contact import (
     Constants,
     contact_force,
@@ -26,25 +27,37 @@ from castblast.muckpile.contact import (
 )
 from castblast.muckpile.neighbours import Balls, Contacts
 from castblast.muckpile.particles import FloatArray, IntArray
-from castblast.muckpile.walls import Walls, wall_distance
+from castblast.muckpile.walls import FRICTION, ROLLING_FRICTION, wall_distance
 
 
-@kernel
+@inline_kernel
 def _pair_forces(
-    balls: Balls, pairs: Contacts, i: int, law: Constants, step: float, work: FloatArray, w: int
+    place: FloatArray,
+    motion: FloatArray,
+    force: FloatArray,
+    partner: NDArray[np.int32],
+    memory: FloatArray,
+    touching: NDArray[np.uint8],
+    dash: FloatArray,
+    first: int,
+    last: int,
+    i: int,
+    law: Constants,
+    step: float,
+    work: FloatArray,
+    w: int,
 ) -> None:
-    """Add the forces of all pairs that ball `i` owns, to itself and to its partners."""
-    place, motion, force = balls.place, balls.motion, balls.force
+    """Add the forces of the pairs first .. last - 1 of ball `i` to it and to its partners."""
     x, y, z, radius = place[i, 0], place[i, 1], place[i, 2], place[i, 3]
     ux, uy, uz = motion[i, 0], motion[i, 1], motion[i, 2]
     wx, wy, wz = motion[i, 3], motion[i, 4], motion[i, 5]
     fx, fy, fz, tx, ty, tz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for p in range(pairs.start[i], pairs.start[i + 1]):
-        j = pairs.partner[p]
+    for p in range(first, last):
+        j = partner[p]
         dx, dy, dz = place[j, 0] - x, place[j, 1] - y, place[j, 2] - z
         square = dx * dx + dy * dy + dz * dz
         radii = radius + place[j, 3]
-        if square >= radii * radii and not pairs.touching[p]:
+        if square >= radii * radii and not touching[p]:
             continue
         distance = sqrt(square)
         overlap = radii - distance
@@ -60,15 +73,13 @@ def _pair_forces(
         )
         effective = radius * place[j, 3] / radii
         if overlap <= 0.0:
-            pairs.touching[p] = 0
-            forget_contact(
-                pairs.memory, pairs.dash, p, law.shear_ratio, effective, slide, step, work, w
-            )
+            touching[p] = 0
+            forget_contact(memory, dash, p, law.shear_ratio, effective, slide, step, work, w)
             continue
-        pairs.touching[p] = 1
+        touching[p] = 1
         (px, py, pz), (mx, my, mz) = contact_force(
-            pairs.memory,
-            pairs.dash,
+            memory,
+            dash,
             p,
             law,
             law.friction,
@@ -104,27 +115,33 @@ def _pair_forces(
     force[i, 5] += tz
 
 
-@kernel
+@inline_kernel
 def _wall_forces(
-    balls: Balls,
-    touches: Contacts,
-    walls: Walls,
+    place: FloatArray,
+    motion: FloatArray,
+    force: FloatArray,
+    partner: NDArray[np.int32],
+    memory: FloatArray,
+    touching: NDArray[np.uint8],
+    dash: FloatArray,
+    first: int,
+    last: int,
+    walls: FloatArray,
     i: int,
     law: Constants,
     step: float,
     work: FloatArray,
     w: int,
 ) -> None:
-    """Add the forces of all walls on ball `i`."""
-    place, motion, force = balls.place, balls.motion, balls.force
+    """Add the forces of the wall contacts first .. last - 1 of ball `i`."""
     radius = place[i, 3]
-    for p in range(touches.start[i], touches.start[i + 1]):
-        k = touches.partner[p]
+    for p in range(first, last):
+        k = partner[p]
         distance, (nx, ny, nz) = wall_distance(
             walls, k, place[i, 0], place[i, 1], place[i, 2], radius
         )
         overlap = radius - distance
-        if overlap <= 0.0 and not touches.touching[p]:
+        if overlap <= 0.0 and not touching[p]:
             continue
         wx, wy, wz = motion[i, 3], motion[i, 4], motion[i, 5]
         arm = radius - 0.5 * max(overlap, 0.0)
@@ -134,19 +151,17 @@ def _wall_forces(
             motion[i, 2] - arm * (wx * ny - wy * nx),
         )
         if overlap <= 0.0:
-            touches.touching[p] = 0
-            forget_contact(
-                touches.memory, touches.dash, p, law.shear_ratio, radius, slide, step, work, w
-            )
+            touching[p] = 0
+            forget_contact(memory, dash, p, law.shear_ratio, radius, slide, step, work, w)
             continue
-        touches.touching[p] = 1
+        touching[p] = 1
         (px, py, pz), (mx, my, mz) = contact_force(
-            touches.memory,
-            touches.dash,
+            memory,
+            dash,
             p,
             law,
-            walls.friction[k],
-            walls.rolling_friction[k],
+            walls[k, FRICTION],
+            walls[k, ROLLING_FRICTION],
             (nx, ny, nz),
             overlap,
             radius,
@@ -165,14 +180,14 @@ def _wall_forces(
         force[i, 5] += mz - arm * (nx * py - ny * px)
 
 
-@kernel
-def _kick(balls: Balls, i: int, gravity: float, half: float) -> None:
+@inline_kernel
+def _kick(
+    radius: float, motion: FloatArray, force: FloatArray, i: int, gravity: float, half: float
+) -> None:
     """Half a step of acceleration for ball `i`, unless it is held."""
-    motion, force = balls.motion, balls.force
     if motion[i, 7] != 0.0:
         return
     per_mass = half / motion[i, 6]
-    radius = balls.place[i, 3]
     per_inertia = per_mass / (0.4 * radius * radius)
     motion[i, 0] += force[i, 0] * per_mass
     motion[i, 1] += force[i, 1] * per_mass
@@ -182,21 +197,28 @@ def _kick(balls: Balls, i: int, gravity: float, half: float) -> None:
     motion[i, 5] += force[i, 5] * per_inertia
 
 
-@kernel
-def _start(balls: Balls, i: int, gravity: float, step: float, elapsed: float) -> float:
-    """Half kick and drift of ball `i`; return the square [m2] of its way off its straight path."""
-    _kick(balls, i, gravity, 0.5 * step)
+@inline_kernel
+def _drift(
+    place: FloatArray,
+    motion: FloatArray,
+    force: FloatArray,
+    reference: FloatArray,
+    i: int,
+    step: float,
+    elapsed: float,
+) -> float:
+    """Move ball `i`, clear its force; return the square [m2] of its way off its straight path."""
     off = 0.0
     for axis in range(3):
-        balls.place[i, axis] += balls.motion[i, axis] * step
-        straight = balls.reference[i, axis] + balls.reference[i, axis + 3] * elapsed
-        off += (balls.place[i, axis] - straight) ** 2
-        balls.force[i, axis] = 0.0
-        balls.force[i, axis + 3] = 0.0
+        place[i, axis] += motion[i, axis] * step
+        straight = reference[i, axis] + reference[i, axis + 3] * elapsed
+        off += (place[i, axis] - straight) ** 2
+        force[i, axis] = 0.0
+        force[i, axis + 3] = 0.0
     return off
 
 
-@kernel
+@lean_kernel
 def _pass_pairs(
     balls: Balls,
     pairs: Contacts,
@@ -209,16 +231,22 @@ def _pass_pairs(
     work: FloatArray,
 ) -> None:
     """Pair forces of the slabs of one parity in first .. last - 1."""
+    place, motion, force = balls.place, balls.motion, balls.force
+    start, partner, memory = pairs.start, pairs.partner, pairs.memory
+    touching, dash = pairs.touching, pairs.dash
     for s in range(first + (first + parity) % 2, last, 2):
         for i in range(slab[s], slab[s + 1]):
-            _pair_forces(balls, pairs, i, law, step, work, s)
+            _pair_forces(
+                place, motion, force, partner, memory, touching, dash,
+                start[i], start[i + 1], i, law, step, work, s,
+            )  # fmt: skip
 
 
-@kernel
+@lean_kernel
 def _pass_balls(
     balls: Balls,
     touches: Contacts,
-    walls: Walls,
+    walls: FloatArray,
     slab: IntArray,
     first: int,
     last: int,
@@ -234,14 +262,23 @@ def _pass_balls(
     A `pending` below zero: no step is under way. A `step` of zero: no other is begun. Returns the
     largest square [m2] of the way off the straight path.
     """
+    place, motion, force = balls.place, balls.motion, balls.force
+    reference = balls.reference
+    start, partner, memory = touches.start, touches.partner, touches.memory
+    touching, dash = touches.touching, touches.dash
     largest = 0.0
     for s in range(first, last):
         for i in range(slab[s], slab[s + 1]):
             if pending >= 0.0:
-                _wall_forces(balls, touches, walls, i, law, pending, work, s)
-                _kick(balls, i, gravity, 0.5 * pending)
+                if start[i] < start[i + 1]:
+                    _wall_forces(
+                        place, motion, force, partner, memory, touching, dash,
+                        start[i], start[i + 1], walls, i, law, pending, work, s,
+                    )  # fmt: skip
+                _kick(place[i, 3], motion, force, i, gravity, 0.5 * pending)
             if step > 0.0:
-                off = _start(balls, i, gravity, step, elapsed)
+                _kick(place[i, 3], motion, force, i, gravity, 0.5 * step)
+                off = _drift(place, motion, force, reference, i, step, elapsed)
                 # A state that is not finite counts as far off.
                 if not off <= largest:
                     largest = off if off == off else np.inf
@@ -253,7 +290,7 @@ def advance(
     balls: Balls,
     pairs: Contacts,
     touches: Contacts,
-    walls: Walls,
+    walls: FloatArray,
     slab: IntArray,
     part: IntArray,
     law: Constants,
@@ -274,7 +311,8 @@ def advance(
         In the order of their cells; changed in place, as the contacts.
     pairs, touches : Contacts
         Ball with ball, ball with wall.
-    walls : Walls
+    walls : array (w, 20)
+        See `castblast.muckpile.walls.wall_table`.
     slab : array (s + 1,)
         First ball of each slab.
     part : array (threads + 1,)
@@ -339,21 +377,21 @@ def first_forces(
     balls: Balls,
     pairs: Contacts,
     touches: Contacts,
-    walls: Walls,
+    walls: FloatArray,
     law: Constants,
+    gravity: float,
     work: FloatArray,
 ) -> None:
     """Forces of the initial state: springs by overlap, no shear and no moment yet."""
     balls.force[:] = 0.0
-    for i in range(len(balls.place)):
-        _pair_forces(balls, pairs, i, law, 0.0, work, 0)
-    for i in range(len(balls.place)):
-        _wall_forces(balls, touches, walls, i, law, 0.0, work, 0)
+    everything = np.array([0, len(balls.place)])
+    _pass_pairs(balls, pairs, everything, 0, 1, 0, law, 0.0, work)
+    _pass_balls(balls, touches, walls, everything, 0, 1, law, gravity, 0.0, 0.0, 0.0, work)
 
 
 @kernel
 def stable_step(
-    balls: Balls, pairs: Contacts, touches: Contacts, walls: Walls, law: Constants
+    balls: Balls, pairs: Contacts, touches: Contacts, walls: FloatArray, law: Constants
 ) -> float:
     """Return the least sqrt(m/k) or sqrt(I/k_r) [s] over all balls, undamped.
 
@@ -400,7 +438,7 @@ def stable_step(
     return sqrt(least)
 
 
-@kernel
+@inline_kernel
 def _add_stiffness(
     stiffness: FloatArray,
     i: int,
@@ -421,7 +459,7 @@ def _add_stiffness(
 
 @kernel
 def survey(
-    balls: Balls, pairs: Contacts, touches: Contacts, walls: Walls, law: Constants
+    balls: Balls, pairs: Contacts, touches: Contacts, walls: FloatArray, law: Constants
 ) -> tuple[float, float, float, int]:
     """Elastic energy [J], largest overlap over radius, sum of overlaps [m], contacts of balls."""
     energy, largest, total, contacts = 0.0, 0.0, 0.0, 0

@@ -19,10 +19,10 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
-from castblast.kernel import kernel, parallel_kernel
+from castblast.kernel import inline_kernel, kernel, parallel_kernel
 from castblast.muckpile.contact import ROW, ball_stiffness, wall_stiffness
 from castblast.muckpile.particles import FloatArray, IntArray
-from castblast.muckpile.walls import Walls, wall_distance
+from castblast.muckpile.walls import wall_distance
 
 
 class Balls(NamedTuple):
@@ -101,7 +101,7 @@ def make_grid(lower: FloatArray, upper: FloatArray, cell: float, count: int) -> 
     return Grid(x, y, z, per_x, per_y, per_z, nx, ny, nz)
 
 
-@kernel
+@inline_kernel
 def _cell(grid: Grid, x: float, y: float, z: float) -> tuple[int, int, int]:
     i = min(max(int((x - grid.x) * grid.per_x), 0), grid.nx - 1)
     j = min(max(int((y - grid.y) * grid.per_y), 0), grid.ny - 1)
@@ -134,10 +134,9 @@ def sort_by_cell(point: FloatArray, grid: Grid) -> tuple[IntArray, IntArray, Int
     return order, start, slab
 
 
-@kernel
-def _approach(balls: Balls, i: int, j: int, horizon: float) -> float:
+@inline_kernel
+def _approach(ref: FloatArray, i: int, j: int, horizon: float) -> float:
     """Square of the least distance [m2] of two straight reference paths before the horizon."""
-    ref = balls.reference
     dx, dy, dz = ref[j, 0] - ref[i, 0], ref[j, 1] - ref[i, 1], ref[j, 2] - ref[i, 2]
     vx, vy, vz = ref[j, 3] - ref[i, 3], ref[j, 4] - ref[i, 4], ref[j, 5] - ref[i, 5]
     closing = -(dx * vx + dy * vy + dz * vz)
@@ -149,9 +148,10 @@ def _approach(balls: Balls, i: int, j: int, horizon: float) -> float:
     return float(dx * dx + dy * dy + dz * dz)
 
 
-@kernel
+@inline_kernel
 def _search(
-    balls: Balls,
+    place: FloatArray,
+    ref: FloatArray,
     cell_start: IntArray,
     grid: Grid,
     skin: float,
@@ -165,7 +165,6 @@ def _search(
     Cells run along z first, so the forward half of the neighbourhood is five runs of balls: the
     rest of the own column, one column beside it, and three columns of the next slab.
     """
-    ref = balls.reference
     half = 0.5 * horizon
     ci, cj, ck = _cell(
         grid,
@@ -174,7 +173,7 @@ def _search(
         ref[i, 2] + half * ref[i, 5],
     )
     low, high = max(ck - 1, 0), min(ck + 1, grid.nz - 1)
-    reach = balls.place[i, 3] + skin
+    reach = place[i, 3] + skin
     count = 0
     for run in range(5):
         a = ci if run < 2 else ci + 1
@@ -184,8 +183,8 @@ def _search(
         column = (a * grid.ny + b) * grid.nz
         first = i + 1 if run == 0 else cell_start[column + low]
         for j in range(first, cell_start[column + high + 1]):
-            limit = reach + balls.place[j, 3]
-            if _approach(balls, i, j, horizon) < limit * limit:
+            limit = reach + place[j, 3]
+            if _approach(ref, i, j, horizon) < limit * limit:
                 if at >= 0:
                     found[at + count] = j
                 count += 1
@@ -199,8 +198,9 @@ def count_partners(
     """Return the number of partners (n,) that each ball owns in the list."""
     number = np.empty(len(balls.place), np.int64)
     nowhere = np.empty(0, np.int32)
+    place, ref = balls.place, balls.reference
     for i in prange(len(number)):
-        number[i] = _search(balls, cell_start, grid, skin, horizon, i, nowhere, -1)
+        number[i] = _search(place, ref, cell_start, grid, skin, horizon, i, nowhere, -1)
     return number
 
 
@@ -215,14 +215,16 @@ def fill_partners(
     partner: NDArray[np.int32],
 ) -> None:
     """Write the partners that `count_partners` counted."""
+    place, ref = balls.place, balls.reference
     for i in prange(len(start) - 1):
-        _search(balls, cell_start, grid, skin, horizon, i, partner, start[i])
+        _search(place, ref, cell_start, grid, skin, horizon, i, partner, start[i])
 
 
-@kernel
+@inline_kernel
 def _search_walls(
-    balls: Balls,
-    walls: Walls,
+    place: FloatArray,
+    ref: FloatArray,
+    walls: FloatArray,
     skin: float,
     horizon: float,
     i: int,
@@ -230,7 +232,6 @@ def _search_walls(
     at: int,
 ) -> int:
     """Count the walls that ball `i` may meet; write them to ``found[at:]`` if at >= 0."""
-    ref = balls.reference
     half = 0.5 * horizon
     x, y, z = (
         ref[i, 0] + half * ref[i, 3],
@@ -238,10 +239,9 @@ def _search_walls(
         ref[i, 2] + half * ref[i, 5],
     )
     speed = np.sqrt(ref[i, 3] ** 2 + ref[i, 4] ** 2 + ref[i, 5] ** 2)
-    radius = balls.place[i, 3]
-    reach = radius + 0.5 * skin + half * speed
+    reach = place[i, 3] + 0.5 * skin + half * speed
     count = 0
-    for k in range(len(walls.origin)):
+    for k in range(len(walls)):
         distance, _ = wall_distance(walls, k, x, y, z, reach)
         if distance < reach:
             if at >= 0:
@@ -251,27 +251,29 @@ def _search_walls(
 
 
 @kernel
-def count_walls(balls: Balls, walls: Walls, skin: float, horizon: float) -> IntArray:
+def count_walls(balls: Balls, walls: FloatArray, skin: float, horizon: float) -> IntArray:
     """Return the number of walls (n,) that each ball may meet."""
     number = np.empty(len(balls.place), np.int64)
     nowhere = np.empty(0, np.int32)
+    place, ref = balls.place, balls.reference
     for i in range(len(number)):
-        number[i] = _search_walls(balls, walls, skin, horizon, i, nowhere, -1)
+        number[i] = _search_walls(place, ref, walls, skin, horizon, i, nowhere, -1)
     return number
 
 
 @kernel
 def fill_walls(
     balls: Balls,
-    walls: Walls,
+    walls: FloatArray,
     skin: float,
     horizon: float,
     start: IntArray,
     partner: NDArray[np.int32],
 ) -> None:
     """Write the walls that `count_walls` counted."""
+    place, ref = balls.place, balls.reference
     for i in range(len(start) - 1):
-        _search_walls(balls, walls, skin, horizon, i, partner, start[i])
+        _search_walls(place, ref, walls, skin, horizon, i, partner, start[i])
 
 
 @parallel_kernel
@@ -300,7 +302,7 @@ def carry_memory(
         _carry_ball(balls, new, old, old_index, modulus, with_walls, i)
 
 
-@kernel
+@inline_kernel
 def _carry_ball(
     balls: Balls,
     new: Contacts,
@@ -335,7 +337,7 @@ def _carry_ball(
                 break
 
 
-@kernel
+@inline_kernel
 def _copy_row(new: Contacts, p: int, old: Contacts, q: int, sign: float) -> None:
     new.touching[p] = 1
     for word in range(ROW - 2):

@@ -29,7 +29,7 @@ from castblast.muckpile.neighbours import (
     starts,
 )
 from castblast.muckpile.particles import FloatArray, IntArray, Particles, ball_mass
-from castblast.muckpile.walls import Walls, without_nan
+from castblast.muckpile.walls import Walls, wall_table
 
 #: Skin over mean diameter; measured as the fastest for balls in free flight and at rest.
 SKIN_RATIO = 0.15
@@ -88,7 +88,7 @@ class Simulation:
     def __post_init__(self) -> None:
         given, count = self.particles, len(self.particles.radius)
         self._law = law_constants(self.law)
-        self._walls = without_nan(self.walls, self._law.friction, self._law.rolling_friction)
+        self._walls = wall_table(self.walls, self._law.friction, self._law.rolling_friction)
         self._factor = self.step_safety * damped_step_factor(self.law)
         if self.skin <= 0.0:
             self.skin = SKIN_RATIO * 2.0 * float(np.mean(given.radius))
@@ -116,7 +116,13 @@ class Simulation:
         self._stale = True
         if self._renew_lists():
             first_forces(
-                self._balls, self._pairs, self._touches, self._walls, self._law, self._work
+                self._balls,
+                self._pairs,
+                self._touches,
+                self._walls,
+                self._law,
+                self.gravity,
+                self._work,
             )
         self._stale = True
 

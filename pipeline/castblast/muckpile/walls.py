@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from castblast.kernel import kernel
+from castblast.kernel import inline_kernel
 from castblast.muckpile.bench import Bench
 from castblast.muckpile.contact import Vector
 from castblast.muckpile.particles import FloatArray
@@ -190,42 +190,63 @@ def _end_rock(y: float, side: float, height: float) -> Walls:
     return join(flank, front, top)
 
 
-def without_nan(walls: Walls, friction: float, rolling_friction: float) -> Walls:
-    """Return `walls` with the friction of the law where they have none of their own."""
-    return walls._replace(
-        friction=np.where(np.isnan(walls.friction), friction, walls.friction),
-        rolling_friction=np.where(
-            np.isnan(walls.rolling_friction), rolling_friction, walls.rolling_friction
-        ),
+#: Columns of a wall table: origin, both axes and normal (3 each), bounds (4), and these.
+FRICTION, ROLLING_FRICTION, _RIM, _ENDLESS = 16, 17, 18, 19
+
+
+def wall_table(walls: Walls, friction: float, rolling_friction: float) -> FloatArray:
+    """Return `walls` as kernels read them, a row of 20 words per wall.
+
+    The friction of the law takes the place of none. One array instead of eight keeps the inner
+    loops free of the bookkeeping that Numba does for each array it takes out of a tuple.
+    """
+    own = np.where(np.isnan(walls.friction), friction, walls.friction)
+    own_rolling = np.where(
+        np.isnan(walls.rolling_friction), rolling_friction, walls.rolling_friction
     )
+    endless = np.all(np.isinf(walls.bounds), axis=1)
+    return np.column_stack(
+        [
+            walls.origin,
+            walls.axis1,
+            walls.axis2,
+            walls.normal,
+            walls.bounds,
+            own,
+            own_rolling,
+            walls.rim,
+            endless,
+        ]
+    ).astype(np.float64)
 
 
-@kernel
+@inline_kernel
 def wall_distance(
-    walls: Walls, k: int, x: float, y: float, z: float, radius: float
+    table: FloatArray, k: int, x: float, y: float, z: float, radius: float
 ) -> tuple[float, Vector]:
     """Distance [m] of a ball's centre from wall `k` and the unit vector from the wall to it.
 
     Over the face the distance has a sign, so that a ball pressed through a plane comes back;
     beside the face it is that to the rim. It is infinite where the ball cannot touch the wall:
-    at a rim that must not be touched, and wholly behind a wall that ends somewhere.
+    at a rim that must not be touched, and wholly behind a wall that ends somewhere. `table` is
+    that of `wall_table`.
     """
-    rx, ry, rz = x - walls.origin[k, 0], y - walls.origin[k, 1], z - walls.origin[k, 2]
-    s = rx * walls.axis1[k, 0] + ry * walls.axis1[k, 1] + rz * walls.axis1[k, 2]
-    t = rx * walls.axis2[k, 0] + ry * walls.axis2[k, 1] + rz * walls.axis2[k, 2]
-    h = rx * walls.normal[k, 0] + ry * walls.normal[k, 1] + rz * walls.normal[k, 2]
-    over_s = s - min(max(s, walls.bounds[k, 0]), walls.bounds[k, 1])
-    over_t = t - min(max(t, walls.bounds[k, 2]), walls.bounds[k, 3])
+    rx, ry, rz = x - table[k, 0], y - table[k, 1], z - table[k, 2]
+    s = rx * table[k, 3] + ry * table[k, 4] + rz * table[k, 5]
+    t = rx * table[k, 6] + ry * table[k, 7] + rz * table[k, 8]
+    h = rx * table[k, 9] + ry * table[k, 10] + rz * table[k, 11]
+    over_s = s - min(max(s, table[k, 12]), table[k, 13])
+    over_t = t - min(max(t, table[k, 14]), table[k, 15])
     if over_s == 0.0 and over_t == 0.0:
-        if h < -radius and not np.all(np.isinf(walls.bounds[k])):
+        if h < -radius and table[k, _ENDLESS] == 0.0:
             return inf, (0.0, 0.0, 1.0)
-        return h, (walls.normal[k, 0], walls.normal[k, 1], walls.normal[k, 2])
-    if not walls.rim[k]:
+        return h, (table[k, 9], table[k, 10], table[k, 11])
+    if table[k, _RIM] == 0.0:
         return inf, (0.0, 0.0, 1.0)
     distance = sqrt(h * h + over_s * over_s + over_t * over_t)
     a, b, c = over_s / distance, over_t / distance, h / distance
     return distance, (
-        a * walls.axis1[k, 0] + b * walls.axis2[k, 0] + c * walls.normal[k, 0],
-        a * walls.axis1[k, 1] + b * walls.axis2[k, 1] + c * walls.normal[k, 1],
-        a * walls.axis1[k, 2] + b * walls.axis2[k, 2] + c * walls.normal[k, 2],
+        a * table[k, 3] + b * table[k, 6] + c * table[k, 9],
+        a * table[k, 4] + b * table[k, 7] + c * table[k, 10],
+        a * table[k, 5] + b * table[k, 8] + c * table[k, 11],
     )
