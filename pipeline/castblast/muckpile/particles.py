@@ -96,3 +96,51 @@ def centre_of_mass(particles: Particles) -> FloatArray:
     """Centre of mass (3,) [m]; the balls have one density."""
     weight = particles.radius**3
     return np.asarray(weight @ particles.position / weight.sum())
+
+
+def check_particles(particles: Particles, overlap_share: float = 0.10) -> list[str]:
+    """Return every fault of a state in words; an empty list means that it can be simulated.
+
+    Parameters
+    ----------
+    particles : Particles
+    overlap_share : float [-]
+        Largest overlap of two balls over their mean radius. Balls at rest under their own weight
+        overlap by a few per cent; much more would throw them apart.
+    """
+    faults = []
+    radius = particles.radius
+    for name, values in (("position", particles.position), ("velocity", particles.velocity)):
+        bad = np.flatnonzero(~np.all(np.isfinite(values), axis=1))
+        if len(bad):
+            faults.append(f"{name} of {len(bad)} balls is not finite, first ball {bad[0]}")
+    bad = np.flatnonzero(~(np.isfinite(radius) & (radius > 0.0)))
+    if len(bad):
+        faults.append(
+            f"radius of {len(bad)} balls is not positive, first ball {bad[0]}: {radius[bad[0]]:g} m"
+        )
+    if faults:
+        return faults
+    return _overlap_faults(particles, overlap_share)
+
+
+def _overlap_faults(particles: Particles, overlap_share: float) -> list[str]:
+    from scipy.spatial import cKDTree
+
+    radius = particles.radius
+    pairs = cKDTree(particles.position).query_pairs(
+        2.0 * float(radius.max()) * (1.0 - 1e-12), output_type="ndarray"
+    )
+    first, second = pairs[:, 0], pairs[:, 1]
+    distance = np.linalg.norm(particles.position[first] - particles.position[second], axis=1)
+    radii = radius[first] + radius[second]
+    share = 2.0 * (radii - distance) / radii
+    bad = np.flatnonzero(share > overlap_share)
+    if not len(bad):
+        return []
+    worst = bad[np.argmax(share[bad])]
+    return [
+        f"{len(bad)} pairs of balls overlap by more than {100.0 * overlap_share:.0f} % of their "
+        f"mean radius; worst: balls {first[worst]} and {second[worst]} by "
+        f"{100.0 * share[worst]:.0f} %"
+    ]

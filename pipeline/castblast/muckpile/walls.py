@@ -190,6 +190,24 @@ def _end_rock(y: float, side: float, height: float) -> Walls:
     return join(flank, front, top)
 
 
+def ground_height(walls: Walls, x: FloatArray, y: FloatArray) -> FloatArray:
+    """Height (n,) [m] of the highest wall that faces up at the places x (n,), y (n,) in plan.
+
+    0 where there is none.
+    """
+    height = np.zeros(np.shape(x))
+    for k in np.flatnonzero(walls.normal[:, 2] > 1e-9):
+        normal, origin = walls.normal[k], walls.origin[k]
+        rx, ry = x - origin[0], y - origin[1]
+        rz = -(normal[0] * rx + normal[1] * ry) / normal[2]
+        along = [rx * a[0] + ry * a[1] + rz * a[2] for a in (walls.axis1[k], walls.axis2[k])]
+        low1, high1, low2, high2 = walls.bounds[k]
+        over = (along[0] >= low1) & (along[0] <= high1)
+        over &= (along[1] >= low2) & (along[1] <= high2)
+        height = np.where(over, np.maximum(height, rz + origin[2]), height)
+    return np.asarray(height)
+
+
 #: Columns of a wall table: origin, both axes and normal (3 each), bounds (4), and these.
 FRICTION, ROLLING_FRICTION, _RIM, _ENDLESS = 16, 17, 18, 19
 
