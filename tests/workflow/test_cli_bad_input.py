@@ -29,7 +29,8 @@ name: test
 density: 931 kg/m3
 detonation_velocity: 4160 m/s
 heat_of_explosion: 3.7 MJ/kg
-jwl: {A: 49.46 GPa, B: 1.891 GPa, C: 0.47761 GPa, R1: 3.907, R2: 1.118, omega: 0.333333, E0: 2.484 GPa}
+jwl: {A: 49.46 GPa, B: 1.891 GPa, C: 0.47761 GPa, E0: 2.484 GPa,
+      R1: 3.907, R2: 1.118, omega: 0.333333}
 source: consistent set of a hydrocode material library
 """
 
@@ -78,7 +79,8 @@ def test_unknown_explosive(castblast: Run) -> None:
     [
         (("49.46 GPa", "49.46"), 2, ("jwl.A", "unit")),
         (("density:", "densty:"), 2, ("densty", "did you mean 'density'")),
-        (("1.891 GPa", "189.1 GPa"), 4, ("tangency",)),
+        (("1.891 GPa", "189.1 GPa"), 4, ("CJ state",)),
+        (("0.47761 GPa", "0.07761 GPa"), 4, ("tangency",)),
         (("source: c", "source2: c"), 2, ("source",)),
         (("R1: 3.907", "R1: [3"), 2, ("line",)),
     ],
@@ -111,7 +113,9 @@ def test_explosive_file_that_is_right(castblast: Run, tmp_path: Path) -> None:
         (("variables:", "variables: ["), ("line",)),
     ],
 )
-def test_recipe(castblast: Run, tmp_path: Path, change: tuple[str, str], words: tuple[str, ...]) -> None:
+def test_recipe(
+    castblast: Run, tmp_path: Path, change: tuple[str, str], words: tuple[str, ...]
+) -> None:
     path = tmp_path / "recipe.yaml"
     path.write_text(RECIPE.replace(*change))
     expect_fault(castblast("generate", path, "--out", tmp_path / "out"), 2, "recipe.yaml", *words)

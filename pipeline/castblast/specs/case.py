@@ -89,7 +89,7 @@ def parse_values(
             faults.append(f"{where}: {name}: no such input{hint}")
             continue
         try:
-            parsed[name] = parse_variable(name, value, where)
+            parsed[name] = parse_variable(name, value, f"{where}: {name}")
         except SpecError as error:
             faults.append(str(error))
     if faults:
