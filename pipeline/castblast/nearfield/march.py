@@ -39,8 +39,8 @@ _OUT_OF_TABLE = int(Status.OUT_OF_ISENTROPE)
 
 #: A step may be at most this much longer than the one before.
 STEP_GROWTH = 1.05
-#: Velocity over wave speed below which rock counts as not yet reached.
-_AT_REST = 1e-10
+#: Share of the highest wall speed so far below which rock counts as not yet reached.
+_AT_REST = 1e-9
 
 
 class WallLoad(NamedTuple):
@@ -229,14 +229,15 @@ def march(case: Annulus) -> March:
     body.force[0] += now * body.radius[0]
     record[0, 0], record[0, 1], record[0, 2] = 0.0, body.radius[0], now
     dt = 1e-2 * case.courant * body.width[0] / wave_speed
-    previous, last_speed = 0.0, 0.0
+    previous, last_speed, peak = 0.0, 0.0, 0.0
     reversal, end, status, steps = 0.0, case.end_time, _NOT_CONVERGED, 0
     while steps < case.max_steps:
         finished = end > 0.0 and time + dt * (1.0 + 1e-9) >= end
         if finished:
             dt = end - time
         _kick(body, active, 0.5 * (previous + dt), case, work)
-        if active < case.zones and abs(body.velocity[active - 1]) > _AT_REST * wave_speed:
+        peak = max(peak, abs(body.velocity[0]))
+        if active < case.zones and abs(body.velocity[active - 1]) > _AT_REST * peak:
             active += 1
         old_radius = body.radius[0]
         moving = active + 1 if active == case.zones else active

@@ -260,7 +260,7 @@ def _share(first: int, second: int, third: int, plane: int, a: float, b: float, 
 def return_to_yield(
     model: YieldModel, radial: float, hoop: float, axial: float, ucs: float, tension: float
 ) -> ReturnedStress:
-    """Return an inadmissible trial stress to the strength surface.
+    """Return a trial stress to the strength surface; an admissible one is left as it is.
 
     Parameters
     ----------
@@ -276,6 +276,8 @@ def return_to_yield(
     i, j = _rank(radial, hoop, axial)
     low, high = min(radial, hoop, axial), max(radial, hoop, axial)
     mid = radial if j == 0 else (hoop if j == 1 else axial)
+    if friction * high - low <= ucs and high <= tension:
+        return _unsorted(i, j, low, mid, high, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False)
     tolerance = TOLERANCE * (abs(low) + abs(high) + ucs)
     least = -tolerance / model.stiffness
     # Sets of one plane are nearly all the returns of a run: no search for them.
