@@ -109,9 +109,7 @@ def _check(trials, friction, psi, tension):
     breaches = np.zeros(6)
     for k in range(trials.shape[0]):
         n = (1.0 + np.sin(friction[k])) / (1.0 - np.sin(friction[k]))
-        m = make_yield_model(
-            BULK, SHEAR, n, (1.0 + np.sin(psi[k])) / (1.0 - np.sin(psi[k]))
-        )
+        m = make_yield_model(BULK, SHEAR, n, (1.0 + np.sin(psi[k])) / (1.0 - np.sin(psi[k])))
         cut = tension[k] * UCS / (n - 1.0)
         a, b, c = trials[k, 0], trials[k, 1], trials[k, 2]
         s = return_to_yield(m, a, b, c, UCS, cut)
@@ -137,7 +135,7 @@ def _check(trials, friction, psi, tension):
 
 
 def test_a_hundred_thousand_random_returns() -> None:
-    """phi 25-55 deg, psi 0-phi, cut-off 0-0.95 of the apex, trials of 10 times the strength.
+    """Trials of 10 times the strength, phi 25-55 deg, psi 0-phi, cut-off 0-0.95 of the apex.
 
     Admissible, idempotent, multipliers >= 0, the same in any order of axes, never the fall-back,
     and stress plus plastic strain make up the trial.

@@ -22,7 +22,7 @@ def cauchy(body):
 
 
 def test_lame_thick_elastic_cylinder() -> None:
-    """a 0.05 m, b 5 m, p 0.1 MPa, free outer face: u(a) = 2.083646e-7 m (Lame), to 1e-3."""
+    """Hole 0.05 m, outer radius 5 m, p 0.1 MPa, free outer face: u(a) = 2.083646e-7 m, to 1e-3."""
     case = rock(young_modulus=3e10)
     transit = 5.0 / wave_speed(case)
     run = march(annulus(

@@ -1,0 +1,172 @@
+"""Statuses, shapes and bookkeeping of `solve_near_field`; helpers that read the end state."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from near_field_problems import ANFO, BASE_ROCK, DOPED, base_hole, blast, rock
+
+from castblast.errors import Status
+from castblast.explosive.isentrope import pressure, tabulated_isentrope
+from castblast.nearfield import march as march_module
+from castblast.nearfield import solver
+from castblast.nearfield.case import EndMode, Hole, NearFieldSettings
+from castblast.nearfield.outcome import (
+    histories,
+    last_time_outside,
+    mean_over,
+    outermost,
+    threshold_radius,
+)
+from castblast.nearfield.solver import NearFieldResult, solve_near_field
+from castblast.variables import VARIABLES
+
+
+def test_every_number_of_the_result_is_in_the_table_of_variables_and_in_its_bounds() -> None:
+    result = blast()
+    extra = {"status", "n_steps", "return_map_fallbacks"}
+    names = {n for n in NearFieldResult._fields if not n.startswith("history_")} - extra
+    assert names <= VARIABLES.keys()
+    for name in names:
+        assert VARIABLES[name].lower <= getattr(result, name) <= VARIABLES[name].upper
+
+
+def test_types_are_plain() -> None:
+    """No NumPy scalars or enums: results go to JSON as they are."""
+    for field, value in blast()._asdict().items():
+        expected = np.ndarray if field.startswith("history_") else (float, int, bool)
+        assert type(value) in (expected if isinstance(expected, tuple) else (expected,)), field
+
+
+@pytest.mark.parametrize(
+    ("case", "hole", "settings"),
+    [
+        (rock(friction_angle=0.0), {}, {}),
+        (rock(friction_angle=-10.0), {}, {}),
+        (rock(friction_angle=90.0), {}, {}),
+        (rock(friction_angle=30.0, dilation_angle=31.0), {}, {}),
+        (rock(dilation_angle=-1.0), {}, {}),
+        (rock(ucs=0.0), {}, {}),
+        (rock(young_modulus=-1.0), {}, {}),
+        (rock(poisson_ratio=0.5), {}, {}),
+        (rock(density=0.0), {}, {}),
+        (rock(tensile_strength=-1.0), {}, {}),
+        (rock(ucs=float("nan")), {}, {}),
+        (rock(young_modulus=float("inf")), {}, {}),
+        (BASE_ROCK, {"diameter": 0.0}, {}),
+        (BASE_ROCK, {"charge_diameter": 0.2}, {}),
+        (BASE_ROCK, {"charge_diameter": 0.0}, {}),
+        (BASE_ROCK, {"rise_time": -1e-6}, {}),
+        (BASE_ROCK, {"in_situ_stress": -1.0}, {}),
+        (BASE_ROCK, {}, {"outer_radius": 0.05}),
+        (BASE_ROCK, {}, {"outer_radius": -5.5}),
+        (BASE_ROCK, {}, {"zones": 2}),
+        (BASE_ROCK, {}, {"mode": 7}),
+        (BASE_ROCK, {}, {"tension": -1}),
+        (BASE_ROCK, {}, {"linear_viscosity": -0.1}),
+        (BASE_ROCK, {}, {"history_points": 1}),
+    ],
+)
+def test_impossible_input_is_a_status_and_not_an_exception(case, hole, settings) -> None:
+    result = blast(of=case, hole=base_hole()._replace(**hole), **settings)
+    assert result.status == Status.BAD_INPUT
+    assert np.isnan(result.equilibrium_pressure)
+    assert np.isnan(result.history_pressure).all()
+    assert not result.settled
+
+
+def test_gas_that_leaves_its_table_is_reported() -> None:
+    """A table that ends at V = 1.05 may be continued to 3.15; weak rock opens the hole further."""
+    volume = np.geomspace(0.7, 1.05, 12)
+    short = tabulated_isentrope(volume, [pressure(ANFO.isentrope, v) for v in volume])
+    result = blast(ANFO._replace(isentrope=short), rock(ucs=2e7))
+    assert result.status == Status.OUT_OF_ISENTROPE
+    assert result.n_steps > 0
+    wide = Hole(0.3, 0.1, 1e-5, 0.0)
+    assert blast(ANFO._replace(isentrope=short), hole=wide).status == Status.OUT_OF_ISENTROPE
+
+
+def test_step_limit_is_not_converged(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(solver, "_MAX_STEPS", 50)
+    result = blast()
+    assert result.status == Status.NOT_CONVERGED
+    assert result.n_steps == 50
+    assert np.isnan(result.expanded_hole_radius)
+
+
+def test_an_open_ledger_and_a_failed_return_are_statuses(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(solver, "LEDGER_TOLERANCE", 1e-12)
+    assert blast().status == Status.LEDGER_OPEN
+    failed = march_module.march(
+        solver._annulus(ANFO, BASE_ROCK, base_hole(), NearFieldSettings())
+    )._replace(fallbacks=3)
+    monkeypatch.setattr(solver, "march", lambda case: failed)
+    result = blast()
+    assert (result.status, result.return_map_fallbacks) == (Status.RETURN_MAP_FAILED, 3)
+
+
+def test_a_state_that_blows_up_is_unstable() -> None:
+    """A first step far beyond the stable limit (reached only by hand) turns a zone inside out."""
+    case = solver._annulus(DOPED, BASE_ROCK, base_hole(rise_time=0.0), NearFieldSettings())
+    run = march_module.march(case._replace(courant=1e5))
+    assert run.status == Status.UNSTABLE_STEP
+
+
+def test_same_numbers_in_any_thread() -> None:
+    """The kernel holds no lock and no state: threads give what one run alone gives, to the bit."""
+    designs = [rock(ucs=u) for u in np.linspace(4e7, 1.5e8, 12)]
+    alone = [blast(of=d).equilibrium_pressure for d in designs]
+    with ThreadPoolExecutor(4) as pool:
+        together = [r.equilibrium_pressure for r in pool.map(lambda d: blast(of=d), designs)]
+    assert together == alone
+
+
+def test_histories_have_fixed_length_and_end_at_the_end() -> None:
+    for points in (2, 33):
+        result = blast(history_points=points, mode=EndMode.PAPER)
+        assert result.history_time.shape == (points,)
+        assert result.history_time[0] == 0.0
+        assert result.history_time[-1] == pytest.approx(result.end_time, rel=1e-12)
+        assert result.history_radius[0] == pytest.approx(0.075)
+        assert result.history_radius[-1] == pytest.approx(result.expanded_hole_radius, rel=1e-12)
+        assert (np.diff(result.history_time) > 0.0).all()
+
+
+def test_integers_and_numpy_numbers_are_accepted() -> None:
+    case = rock(young_modulus=np.float64(2e10), ucs=100_000_000)
+    result = solve_near_field(
+        ANFO, case, base_hole(), NearFieldSettings(mode=1, zones=np.int64(144))
+    )
+    assert result.equilibrium_pressure == blast().equilibrium_pressure
+
+
+def test_equilibrium_time_is_the_last_time_outside_one_percent() -> None:
+    result = blast(history_points=2000, mode=EndMode.PAPER)
+    outside = np.abs(result.history_radius / result.expanded_hole_radius - 1.0) > 0.01
+    last = result.history_time[outside][-1]
+    assert result.equilibrium_time == pytest.approx(last, abs=2.0 * result.end_time / 2000.0)
+
+
+def test_threshold_radius_is_linear_between_zone_centres() -> None:
+    nodes = np.array([1.0, 2.0, 3.0, 4.0])
+    assert threshold_radius(nodes, np.array([0.03, 0.02, 0.0]), 0.01) == pytest.approx(3.0)
+    assert threshold_radius(nodes, np.array([0.03, 0.0, 0.0]), 0.015) == pytest.approx(2.0)
+    assert threshold_radius(nodes, np.array([0.001, 0.0, 0.0]), 0.01) == 1.0
+    assert threshold_radius(nodes, np.array([1.0, 1.0, 1.0]), 0.01) == 4.0
+
+
+def test_outermost_is_the_outer_face_of_the_last_marked_zone() -> None:
+    nodes = np.array([1.0, 2.0, 4.0, 8.0])
+    assert outermost(nodes, np.array([1, 3, 0]), 2) == 4.0
+    assert outermost(nodes, np.array([1, 1, 0]), 2) == 1.0
+
+
+def test_window_mean_cuts_steps_at_its_ends() -> None:
+    """With r = 1 + t on uneven steps: the mean over [0.25, 0.75] is 1.5, extremes 1.25, 1.75."""
+    time = np.array([0.0, 0.1, 0.4, 0.6, 1.0])
+    record = np.column_stack([time, 1.0 + time, np.zeros(5)])
+    assert mean_over(record, 0.25, 0.75) == pytest.approx((1.5, 1.25, 1.75))
+    assert last_time_outside(record, 2.0, 0.3) == pytest.approx(0.7)
+    times, _, radius = histories(record, 3)
+    np.testing.assert_allclose(times, [0.0, 0.25, 1.0])
+    np.testing.assert_allclose(radius, [1.0, 1.25, 2.0])
