@@ -85,10 +85,10 @@ def run_muckpile(
         result.particles,
         geometry,
         block_velocity=case.block_velocity,
-        law=case.law,
+        walls=case.walls,
     )
     outcome = describe_run(spec, speed, prediction, start, result, metrics)
-    files = write_results(folder, spec, start.balls, result, outcome.document)
+    files = write_results(folder, spec, case, result, outcome.document)
     progress(1.0, f"{result.time:.1f} s simulated")
     return MuckpileOutcome(outcome.document, outcome.title, outcome.rows, files)
 

@@ -23,7 +23,8 @@ from castblast.muckpile.profile import (
     section,
     surface_height,
 )
-from castblast.muckpile.solver import CastHistory, CastResult
+from castblast.muckpile.solver import CastCase, CastHistory, CastResult
+from castblast.muckpile.walls import Walls, ground_height
 from castblast.specs.bench import BenchSpec
 
 #: Shares of the length of the bench at which the profile is written, besides the mean.
@@ -118,7 +119,7 @@ def _rows(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:
 def write_results(
     folder: Path,
     spec: BenchSpec,
-    before: Particles,
+    case: CastCase,
     result: CastResult,
     document: Mapping[str, Any],
 ) -> list[Path]:
@@ -128,8 +129,8 @@ def write_results(
     """
     from castblast.report.muckpile_figures import draw_energy, draw_plan, draw_section
 
-    bench, after = spec.bench.to_bench(), result.particles
-    surface = _surface(before, after, bench)
+    bench, before, after = spec.bench.to_bench(), case.particles, result.particles
+    surface = _surface(before, after, bench, case.walls)
     mean = mean_profile(surface)
     stored: dict[str, Any] = {
         "x": after.position,
@@ -165,10 +166,13 @@ def _inside(balls: Particles, bench: Bench) -> bool:
     return bool(((along >= 0.0) & (along <= bench.length)).mean() >= _INSIDE_SHARE)
 
 
-def _surface(before: Particles, after: Particles, bench: Bench) -> HeightField:
+def _surface(before: Particles, after: Particles, bench: Bench, walls: Walls) -> HeightField:
+    """Top of the pile, or of the ground where there is none."""
     cell = float(2.0 * after.radius.mean())
     span = (0.0, bench.length) if _inside(before, bench) else None
-    return surface_height(after.position, after.radius, cell=cell, y_range=span)
+    surface = surface_height(after.position, after.radius, cell=cell, y_range=span)
+    ground = ground_height(walls, *np.meshgrid(surface.x, surface.y))
+    return surface._replace(height=np.maximum(surface.height, ground))
 
 
 def _section_place(before: Particles, bench: Bench) -> float:
@@ -181,7 +185,8 @@ def _section_place(before: Particles, bench: Bench) -> float:
 
 def _profile_columns(surface: HeightField, mean: Profile) -> dict[str, Any]:
     columns: dict[str, Any] = {"x [m]": mean.x, "mean_height [m]": mean.height}
-    low, high = float(surface.y[0]), float(surface.y[-1])
+    half = 0.5 * (surface.y[-1] - surface.y[0]) / max(len(surface.y) - 1, 1)
+    low, high = surface.y[0] - half, surface.y[-1] + half
     for share in SECTIONS:
         y = low + share * (high - low)
         columns[f"height_at_y_{y:.1f}_m [m]"] = section(surface, y).height
