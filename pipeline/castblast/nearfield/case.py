@@ -75,10 +75,12 @@ class NearFieldSettings(NamedTuple):
     mode : EndMode
     tension : TensionMode
     outer_radius : float [m]
-        0: 5.5 m in paper mode, as large as the end state needs in equilibrium mode.
+        0: 5.5 m in paper mode, 1000 hole radii in equilibrium mode.
     zones : int
         0: the default of the mode.
     quadratic_viscosity, linear_viscosity : float [-]
+        See `castblast.nearfield.lagrangian`; below a linear viscosity of 0.1 weak rock of high
+        friction has no answer that converges.
     history_points : int
         Length of the pressure and radius histories.
     """

@@ -190,7 +190,7 @@ class SolverSpec(Spec):
     zones: int = Field(default=0, ge=0, le=int(VARIABLES["zones"].upper))
     outer_radius: float | None = None
     quadratic_viscosity: float = 1.5
-    linear_viscosity: float = 0.3
+    linear_viscosity: float = 0.15
     history_points: int = Field(default=64, ge=2, le=4096)
 
     @field_validator("outer_radius", "quadratic_viscosity", "linear_viscosity", mode="before")
