@@ -9,6 +9,7 @@ from typing import Any
 from castblast import __version__
 from castblast.report.html import Picture, Section, Table, write_report
 from castblast.stages.dataset import describe_dataset
+from castblast.stages.muckpile_results import metric_rows
 from castblast.variables import VARIABLES
 
 _LEAD = (
@@ -128,7 +129,10 @@ def _prediction(folder: Path) -> Section:
 
 def _muckpile(folder: Path) -> Section:
     metrics = _read(folder / "metrics.json")
-    rows = [(row["name"], row["value"], row["unit"]) for row in metrics["rows"]]
+    title = (
+        f"{metrics['balls']:,} balls of mean radius {metrics['mean_radius']:.2f} m, thrown at "
+        f"{metrics['initial_velocity']:.1f} m/s, at rest after {metrics['simulated_time']:.1f} s."
+    )
     captions = {
         "section": "Cross-section, balls coloured by block",
         "plan": "Plan view, before and after",
@@ -141,6 +145,7 @@ def _muckpile(folder: Path) -> Section:
     ]  # fmt: skip
     return Section(
         "Muckpile",
-        tables=[Table(("quantity", "value", "unit"), rows)],
+        paragraphs=[title],
+        tables=[Table(("quantity", "value", "unit"), metric_rows(metrics))],
         pictures=pictures,
     )

@@ -95,25 +95,35 @@ def describe_run(
     title = f"{spec.name}: {plain['balls']:,} balls, {speed:.3g} m/s, {result.time:.1f} s simulated"
     if Status(result.status) is Status.NOT_CONVERGED:
         title += " (longest time reached before the pile came to rest)"
-    return MuckpileOutcome(plain, title, _rows(plain))
+    return MuckpileOutcome(plain, title, metric_rows(plain))
 
 
-def _rows(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+def metric_rows(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """Headline metrics of a run for people: name, value, unit."""
     throw = document["throw"]
     entries = (
         ("throw of the centre of mass", throw[0], "m"),
         ("drop of the centre of mass", -throw[2], "m"),
-        ("cast fraction", 100.0 * document["cast_fraction"], "%"),
+        ("cast fraction", _scaled(document["cast_fraction"], 100.0), "%"),
         ("run-out of 95 % of the mass", document["runout_95"], "m"),
         ("run-out of 99 % of the mass", document["runout_99"], "m"),
         ("maximum height", document["maximum_height"], "m"),
-        ("swell", document["swell"], "-"),
-        ("repose angle", math.degrees(document["repose_angle"]), "deg"),
+        ("swell: pile over bench volume", document["swell"], "1"),
+        ("pile volume over volume of the balls", document["rock_swell"], "1"),
+        ("mean slope of the pile", _scaled(document["repose_angle"], 180.0 / math.pi), "deg"),
         ("throw in free flight", document["ballistic_throw"], "m"),
-        ("open energy balance", 100.0 * document["ledger"]["residual"], "%"),
-        ("time on the clock", document["seconds"], "s"),
+        ("open energy balance", _scaled(document["ledger"]["residual"], 100.0), "%"),
+        ("time on the clock", document.get("seconds"), "s"),
     )
-    return [(name, f"{value:.3g}", unit) for name, value, unit in entries]
+    return [
+        (name, "-" if value is None else f"{value:.3g}", unit)
+        for name, value, unit in entries
+        if name != "time on the clock" or value is not None
+    ]
+
+
+def _scaled(value: float | None, factor: float) -> float | None:
+    return None if value is None else factor * value
 
 
 def write_results(
