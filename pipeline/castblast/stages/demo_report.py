@@ -86,18 +86,18 @@ def _surrogate(folder: Path) -> Section:
         f"R² and 95 % quantile of the relative error on {comparison['test_rows']:,} test rows "
         "never trained on"
     )
-    reference = comparison["league"][0]["name"]
-    figure = next(folder.glob("*/figure_2.png"))
+    figures = [
+        Picture(path, f"Learning curve, error histogram, predicted against simulated: {name}")
+        for name in (entry["name"] for entry in comparison["league"])
+        if (path := folder / name / "figure_2.png").is_file()
+    ]
+    best = comparison["league"][0]["name"]
     return Section(
         "Surrogate: league table and the paper's Figure 2",
         paragraphs=[f"Chosen: {comparison['chosen']} ({comparison['rule']})."],
         tables=[Table(header, rows, caption)],
-        pictures=[
-            Picture(figure, f"Learning curve, error histogram, predicted against simulated "
-                            f"({figure.parent.name})"),
-            Picture(folder / reference / "parity.png", f"All targets of {reference}"),
-        ],
-    )  # fmt: skip
+        pictures=[*figures, Picture(folder / best / "parity.png", f"All targets of {best}")],
+    )
 
 
 def _prediction(folder: Path) -> Section:
