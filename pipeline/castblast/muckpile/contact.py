@@ -318,14 +318,15 @@ def _grow(
     y = force[1] - (stiffness * step + drag) * rate[1]
     z = force[2] - (stiffness * step + drag) * rate[2]
     square = x * x + y * y + z * z
-    slips = square > limit * limit
     slip_work = 0.0
-    if slips:
+    if square > limit * limit:
         length = sqrt(square)
         before = (force[0] * x + force[1] * y + force[2] * z) / length
         slip_work = 0.5 * (before + limit) * (length - limit) / stiffness
         cut = limit / length
         x, y, z = x * cut, y * cut, z * cut
+    # At the limit is slipping: a frictionless contact slips before its spring has grown.
+    slips = square >= limit * limit
     return (x + drag * rate[0], y + drag * rate[1], z + drag * rate[2]), slip_work, slips
 
 

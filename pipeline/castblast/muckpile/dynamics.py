@@ -298,11 +298,12 @@ def advance(
     steps: int,
     pending: float,
     step: float,
-    elapsed: float,
+    clock: float,
+    built: float,
     horizon: float,
     allowed: float,
     work: FloatArray,
-) -> tuple[int, int, float]:
+) -> tuple[int, int, float, float]:
     """Make up to `steps` steps; stop early, inside a step, when the lists must be made anew.
 
     Parameters
@@ -325,8 +326,10 @@ def advance(
         Length of the step that is under way (balls drifted, forces missing); negative: none.
     step : float [s]
         Length of the next steps.
-    elapsed : float [s]
-        Age of the lists at the present positions.
+    clock : float [s]
+        Time of the present positions.
+    built : float [s]
+        Time at which the lists were made.
     horizon : float [s]
         Age up to which the lists are complete.
     allowed : float [m]
@@ -338,14 +341,15 @@ def advance(
     -------
     ended, begun : int
         Number of steps.
-    pending : float
-        As on entry.
+    pending, clock : float
+        As on entry. The clock is summed step by step, so that it is the same wherever one stops.
     """
     workers = len(part) - 1
     off = np.zeros(workers)
     ended, begun = 0, 0
     if pending < 0.0:
-        elapsed += step
+        clock += step
+        elapsed = clock - built
         for w in prange(workers):
             off[w] = _pass_balls(
                 balls, touches, walls, slab, part[w], part[w + 1],
@@ -353,23 +357,24 @@ def advance(
             )  # fmt: skip
         begun += 1
         pending = step
-    while not (elapsed > horizon or not off.max() <= allowed * allowed):
+    while not (clock - built > horizon or not off.max() <= allowed * allowed):
         for parity in range(2):
             for w in prange(workers):
                 _pass_pairs(balls, pairs, slab, part[w], part[w + 1], parity, law, pending, work)
         ended += 1
         following = step if ended < steps else 0.0
-        elapsed += following
+        elapsed = clock + following - built
         for w in prange(workers):
             off[w] = _pass_balls(
                 balls, touches, walls, slab, part[w], part[w + 1],
                 law, gravity, pending, following, elapsed, work,
             )  # fmt: skip
         if following == 0.0:
-            return ended, begun, -1.0
+            return ended, begun, -1.0, clock
         begun += 1
+        clock += following
         pending = step
-    return ended, begun, pending
+    return ended, begun, pending, clock
 
 
 @kernel
@@ -460,9 +465,12 @@ def _add_stiffness(
 @kernel
 def survey(
     balls: Balls, pairs: Contacts, touches: Contacts, walls: FloatArray, law: Constants
-) -> tuple[float, float, float, int]:
-    """Elastic energy [J], largest overlap over radius, sum of overlaps [m], contacts of balls."""
-    energy, largest, total, contacts = 0.0, 0.0, 0.0, 0
+) -> tuple[float, float, float, int, int]:
+    """Elastic energy [J], largest overlap over radius, sum of overlaps [m], contacts of balls.
+
+    The last number is the ball with the largest overlap.
+    """
+    energy, largest, total, contacts, worst = 0.0, 0.0, 0.0, 0, 0
     place = balls.place
     for i in range(len(place)):
         radius = place[i, 3]
@@ -476,7 +484,8 @@ def survey(
                 overlap = radii - sqrt(square)
                 effective = radius * place[j, 3] / radii
                 energy += spring_energy(pairs.memory, p, overlap, effective, law.shear_ratio)
-                largest = max(largest, overlap / min(radius, place[j, 3]))
+                if overlap > largest * min(radius, place[j, 3]):
+                    largest, worst = overlap / min(radius, place[j, 3]), i
                 total += overlap
                 contacts += 1
         for p in range(touches.start[i], touches.start[i + 1]):
@@ -486,5 +495,6 @@ def survey(
                 )
                 overlap = radius - distance
                 energy += spring_energy(touches.memory, p, overlap, radius, law.shear_ratio)
-                largest = max(largest, overlap / radius)
-    return energy, largest, total, contacts
+                if overlap > largest * radius:
+                    largest, worst = overlap / radius, i
+    return energy, largest, total, contacts, worst

@@ -16,7 +16,6 @@ from typing import NamedTuple
 import numpy as np
 
 from castblast.errors import Status
-from castblast.kernel import kernel
 from castblast.muckpile.bench import Bench, assign_blocks, bench_volume, check_bench, crest_position
 from castblast.muckpile.contact import ContactLaw
 from castblast.muckpile.particles import (
@@ -24,6 +23,7 @@ from castblast.muckpile.particles import (
     Particles,
     particles_at_rest,
 )
+from castblast.muckpile.porosity import solid_fraction
 from castblast.muckpile.separation import push_apart
 from castblast.muckpile.simulation import Simulation
 from castblast.muckpile.threads import thread_count
@@ -271,78 +271,3 @@ def _slowest_vibration(bench: Bench, law: ContactLaw) -> float:
     balls; measured on settling packings by this project.
     """
     return float(pi / (2.0 * bench.height) * sqrt(0.8 * law.effective_modulus / law.density))
-
-
-def solid_fraction(particles: Particles, bench: Bench, margin: float = 0.0) -> float:
-    """Share of the volume inside the settled bench that balls fill.
-
-    Parameters
-    ----------
-    particles : Particles
-    bench : Bench
-    margin : float [m]
-        Kept from walls, face and top; 0: two mean diameters, or a quarter of the shortest side.
-
-    Notes
-    -----
-    Counts the nodes of a lattice (six to the mean diameter) that lie in a ball.
-    """
-    radius = particles.radius
-    top = float(np.quantile(particles.position[:, 2] + radius, 0.99))
-    sides = min(bench.length, bench.width + crest_position(bench), top)
-    keep = margin or min(4.0 * float(np.mean(radius)), 0.25 * sides)
-    low = np.array([-bench.width + keep, keep, keep])
-    high = np.array([-keep, bench.length - keep, top - keep])
-    spacing = float(np.mean(radius)) / 3.0
-    covered, nodes = _count_nodes(
-        particles.position,
-        radius,
-        low,
-        high,
-        spacing,
-        float(sin(bench.face_angle)),
-        float(cos(bench.face_angle)),
-        keep,
-    )
-    return covered / max(nodes, 1)
-
-
-@kernel
-def _count_nodes(
-    position: FloatArray,
-    radius: FloatArray,
-    low: FloatArray,
-    high: FloatArray,
-    spacing: float,
-    sine: float,
-    cosine: float,
-    keep: float,
-) -> tuple[int, int]:
-    """Lattice nodes in balls, and all of them, in the box low .. high behind the face."""
-    covered, nodes = 0, 0
-    size = np.empty(3, np.int64)
-    for axis in range(3):
-        size[axis] = int((high[axis] - low[axis]) / spacing) + 1
-    for i in range(size[0]):
-        for k in range(size[2]):
-            if -(low[0] + i * spacing) * sine - (low[2] + k * spacing) * cosine >= keep:
-                nodes += size[1]
-    first, last = np.empty(3, np.int64), np.empty(3, np.int64)
-    for n in range(len(radius)):
-        for axis in range(3):
-            start = (position[n, axis] - radius[n] - low[axis]) / spacing
-            end = (position[n, axis] + radius[n] - low[axis]) / spacing
-            first[axis] = max(int(np.ceil(start)), 0)
-            last[axis] = min(int(np.floor(end)), size[axis] - 1)
-        for i in range(first[0], last[0] + 1):
-            x = low[0] + i * spacing
-            for k in range(first[2], last[2] + 1):
-                z = low[2] + k * spacing
-                if -x * sine - z * cosine < keep:
-                    continue
-                for j in range(first[1], last[1] + 1):
-                    y = low[1] + j * spacing
-                    square = (x - position[n, 0]) ** 2 + (z - position[n, 2]) ** 2
-                    if square + (y - position[n, 1]) ** 2 < radius[n] ** 2:
-                        covered += 1
-    return covered, nodes

@@ -3,7 +3,8 @@
 The surface is what a vertical line meets first: the highest point of any ball above a place in
 plan. Volumes and profiles follow from it. Balls have one density, so shares of mass are shares of
 ball volume. Beside the simulated throw stands the ballistic one, in which every ball flies freely
-to the floor: an upper bound that no contact has slowed down.
+to the floor and stays where it comes down: contacts in flight shorten the throw, sliding and
+rolling after it lengthen it.
 """
 
 from __future__ import annotations
@@ -62,9 +63,11 @@ class PileMetrics(NamedTuple):
     pile_volume : float [m3]
         Between surface and ground.
     swell : float [-]
-        Pile volume over the volume of the bench.
+        Pile volume over the volume of the bench; near 1, since the bench of balls is as porous
+        as the pile.
     rock_swell : float [-]
-        Pile volume over the solid volume of the balls, i.e. over rock without pores.
+        Pile volume over the solid volume of the balls, i.e. over rock without pores: the swell
+        factor of practice.
     repose_angle : float [rad]
         Slope of the mean profile on the side of the throw; NaN where the pile has no such side.
     ballistic_throw : float [m]

@@ -35,6 +35,9 @@ from castblast.muckpile.walls import Walls, wall_table
 SKIN_RATIO = 0.15
 #: A ball may stray this far from the centre of a cast before its state counts as unstable [m].
 FARTHEST = 1e6
+#: Overlap over radius that only an unstable step can make: a small ball caught between large ones
+#: in a cast reaches 2 with the usual soft modulus.
+DEEPEST = 20.0
 #: First and longest life of a list, in steps.
 FIRST_LIFE, LONGEST_LIFE = 16, 64
 
@@ -130,7 +133,7 @@ class Simulation:
 
     @property
     def failed(self) -> bool:
-        """Whether the state became non-finite."""
+        """Whether the state became non-finite, or balls passed through one another."""
         return self.failed_ball >= 0
 
     @property
@@ -150,8 +153,13 @@ class Simulation:
         )
 
     def survey(self) -> tuple[float, float, int]:
-        """Elastic energy [J], largest overlap over radius, number of contacts between balls."""
+        """Elastic energy [J], largest overlap over radius, number of contacts between balls.
+
+        A ball that is wholly inside another or behind a wall is noted as a failure.
+        """
         found = survey(self._balls, self._pairs, self._touches, self._walls, self._law)
+        if found[1] > DEEPEST and not self.failed:
+            self.failed_ball = int(self._balls.identity[found[4]])
         return float(found[0]), float(found[1]), int(found[3])
 
     def mean_overlap(self) -> float:
@@ -196,7 +204,7 @@ class Simulation:
             to_event = ceil(min((event - self.clock) / self._step, 1e9) - 1e-6)
             to_until = ceil(min((until - self.clock) / self._step, 1e9) - 1e-6)
             goal = max(1, min(to_event, to_until) + under_way)
-            ended, begun, self._pending = advance(
+            ended, begun, self._pending, self.clock = advance(
                 self._balls,
                 self._pairs,
                 self._touches,
@@ -208,13 +216,13 @@ class Simulation:
                 goal,
                 self._pending,
                 self._step,
-                self.clock - self._built,
+                self.clock,
+                self._built,
                 self._horizon,
                 0.5 * self.skin,
                 self._work,
             )
             self.steps += ended
-            self.clock += begun * self._step
             if self.time_step <= 0.0 and begun == to_event:
                 self.clock = event
             self._stale = self._pending >= 0.0

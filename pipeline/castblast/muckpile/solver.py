@@ -177,9 +177,10 @@ class CastResult(NamedTuple):
         Final state, in the order of the case.
     time : float [s]
     status : Status
-        OK: at rest; NOT_CONVERGED: `max_time` was reached first; UNSTABLE_STEP: not finite.
+        OK: at rest; NOT_CONVERGED: `max_time` was reached first; UNSTABLE_STEP: the state became
+        non-finite, or a ball passed through another.
     failed_ball : int
-        First ball with a state that is not finite; -1: none.
+        Ball with which that began; -1: none.
     failed_time : float [s]
         When that was noticed; NaN: never.
     history : CastHistory
@@ -219,7 +220,7 @@ class _Record:
         )
         self.largest_energy = max(self.largest_energy, moving)
         self.largest_overlap = max(self.largest_overlap, overlap)
-        if moving >= self.case.stop_energy_ratio * self.largest_energy:
+        if moving > self.case.stop_energy_ratio * self.largest_energy:
             self.quiet_since = inf
         elif self.quiet_since == inf:
             self.quiet_since = run.clock
@@ -349,6 +350,9 @@ def _run_to_rest(
             break
         if run.clock >= next_sample:
             state = record.add(run)
+            if run.failed:
+                status = Status.UNSTABLE_STEP
+                break
             next_sample += case.sample_interval
             progress(record.share(last_firing), _line(record))
             if not len(firings) and record.at_rest(last_firing):
