@@ -120,7 +120,7 @@ def test_no_ball_leaves_through_a_wall(cast):
 def test_a_pile_is_steeper_with_more_rolling_friction(cast):
     """Ai et al. (2011), Wensrich and Katterfeld (2012): run-out falls with mu_r."""
     _, case, result = cast
-    smooth = run_cast(case._replace(law=ContactLaw(rolling_friction=0.05)))
+    smooth = run_cast(case._replace(law=ContactLaw(rolling_friction=0.05), max_time=4.0))
     far, near = (
         np.sqrt(np.mean(np.maximum(r.particles.position[:, 0], 0.0) ** 2)) for r in (smooth, result)
     )

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from castblast.muckpile.contact import ContactLaw, damped_step_factor, law_constants
-from castblast.muckpile.dynamics import advance, first_forces, stable_step, survey
+from castblast.muckpile.dynamics import advance, first_forces
 from castblast.muckpile.neighbours import (
     Balls,
     Contacts,
@@ -29,6 +29,7 @@ from castblast.muckpile.neighbours import (
     starts,
 )
 from castblast.muckpile.particles import FloatArray, IntArray, Particles, ball_mass
+from castblast.muckpile.stability import stable_step, survey
 from castblast.muckpile.walls import Walls, wall_table
 
 #: Skin over mean diameter; measured as the fastest for balls in free flight and at rest.
