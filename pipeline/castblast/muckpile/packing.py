@@ -247,7 +247,7 @@ def _settle(
         run.slow(brake)
         progress(
             min(0.99, 0.2 + 0.4 * run.clock),
-            f"packing: settling, t = {run.clock:.2f} s {energy / limit}",
+            f"packing: settling, t = {run.clock:.2f} s",
         )
     state = run.state()
     particles = particles_at_rest(
