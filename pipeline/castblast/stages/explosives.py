@@ -140,6 +140,7 @@ def require_consistent(spec: ExplosiveSpec, *, allow_inconsistent: bool = False)
     findings = spec.check()
     failed = rejected(findings)
     if failed and not allow_inconsistent:
-        lines = "\n".join(f"{spec.name}: inconsistent explosive: {finding}" for finding in failed)
-        raise CheckError(lines)
+        lines = [f"{spec.name}: inconsistent explosive: {finding}" for finding in failed]
+        lines.append("mend the file, or run it as it is with --allow-inconsistent")
+        raise CheckError("\n".join(lines))
     return [f"{spec.name}: {finding}" for finding in [*failed, *warned(findings)]]
