@@ -163,3 +163,13 @@ def test_a_truncated_npz_is_refused(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes()[:400])
     with pytest.raises(SpecError, match=r"no readable \.npz"):
         read_balls(path)
+
+
+def test_folder_of_the_same_name_hides_no_shipped_bench(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`castblast demo` leaves a folder `demo`; the bench of that name is still found."""
+    with monkeypatch.context() as patch:
+        patch.chdir(tmp_path)
+        (tmp_path / "demo").mkdir()
+        assert find_bench("demo").name == "demo.yaml"

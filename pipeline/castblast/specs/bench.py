@@ -109,7 +109,7 @@ class BallsSpec(Spec):
     count: Annotated[int, Field(ge=10, le=5_000_000)] | None = None
     file: Annotated[str, Field(min_length=1)] | None = None
     relative_deviation: Annotated[float, QuantityIn("1", 0.0, 0.8)] = 0.5
-    solid_fraction: Annotated[float, QuantityIn("1", 0.5, 0.63)] = 0.60
+    solid_fraction: Annotated[float, QuantityIn("1", 0.55, 0.63)] = 0.60
 
     @model_validator(mode="after")
     def _one_of_three(self) -> BallsSpec:
@@ -273,7 +273,7 @@ class BenchSpec(Spec):
 def find_bench(name_or_path: str | Path) -> Path:
     """Path of a bench file: one that came with castblast, by name, or a user's own."""
     path = Path(name_or_path)
-    if path.suffix or path.parent != Path() or path.exists():
+    if path.suffix or path.parent != Path() or path.is_file():
         return path
     folder = resource(_FOLDER)
     known = sorted(entry.stem for entry in folder.glob("*.yaml"))
