@@ -10,6 +10,22 @@ from castblast.cli.verb import verb
 
 app = typer.Typer(help="The catalogue of explosives and their checks.", no_args_is_help=True)
 
+#: What `show` prints: unit for people and factor from SI.
+_SHOWN = {
+    "density": ("kg m-3", 1.0),
+    "detonation_velocity": ("m s-1", 1.0),
+    "in_hole_velocity_150_mm": ("m s-1", 1.0),
+    "heat_of_explosion": ("MJ kg-1", 1e-6),
+    "total_energy": ("MJ l-1", 1e-9),
+    "energy_at_explosion_state": ("MJ l-1", 1e-9),
+    "cj_pressure": ("GPa", 1e-9),
+    "explosion_pressure": ("GPa", 1e-9),
+    "constant_volume_pressure": ("GPa", 1e-9),
+    "work": ("MJ kg-1", 1e-6),
+    "relative_volume": ("1", 1.0),
+    "exponent": ("1", 1.0),
+}
+
 _Name = Annotated[str, typer.Argument(help="Name in the catalogue, or an explosive file.")]
 
 
@@ -42,9 +58,30 @@ def show(screen: Screen, name: _Name) -> Mapping[str, Any]:
     from castblast.stages.explosives import describe
 
     description = describe(name)
-    for key, value in description.items():
-        screen.say(f"{key.replace('_', ' ')}: {value}")
+    rows = [
+        (f"{_words(key)} {part}".strip(), f"{value * factor:.5g}", unit)
+        for key, (unit, factor) in _SHOWN.items()
+        for part, value in _parts(description[key])
+    ]
+    title = f"{description['name']} ({description['form']})"
+    screen.table(("quantity", "value", "unit"), rows, title=title)
+    derived = ", ".join(_words(key) for key in description["derived"])
+    texts = (description["source"], derived, description["notes"])
+    for label, text in zip(("Source", "Derived by this project", "Notes"), texts, strict=True):
+        if text:
+            screen.say(f"{label}: {text}")
     return description
+
+
+def _words(key: str) -> str:
+    return key.replace("_", " ")
+
+
+def _parts(value: float | Mapping[str, float] | None) -> list[tuple[str, float]]:
+    """A number, or numbers by the state they belong to; nothing if it is not known."""
+    if value is None:
+        return []
+    return list(value.items()) if isinstance(value, Mapping) else [("", value)]
 
 
 @verb(app)

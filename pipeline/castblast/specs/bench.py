@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from castblast.errors import nearest_name
+from castblast.errors import SpecError, nearest_name
 from castblast.muckpile.bench import (
     Bench,
     block_shape,
@@ -271,13 +271,23 @@ class BenchSpec(Spec):
 
 
 def find_bench(name_or_path: str | Path) -> Path:
-    """Path of a bench file: one that came with castblast, by name, or a user's own."""
+    """Path of a bench file: one that came with castblast, by name, or a user's own.
+
+    Raises
+    ------
+    SpecError
+        A bare name that no shipped bench has; the nearest is named.
+    """
     path = Path(name_or_path)
     if path.suffix or path.parent != Path() or path.is_file():
         return path
     folder = resource(_FOLDER)
     known = sorted(entry.stem for entry in folder.glob("*.yaml"))
-    return folder / f"{path}.yaml" if str(path) in known else path
+    if str(path) in known:
+        return folder / f"{path}.yaml"
+    hint = nearest_name(str(path), known)
+    message = f"unknown bench '{path}'{hint or ';'} known: {', '.join(known)}; or a YAML file"
+    raise SpecError(message)
 
 
 def load_bench(name_or_path: str | Path) -> BenchSpec:

@@ -58,7 +58,8 @@ def train(
         Model specs (YAML); none: the reference. The first and the
         chosen one get a learning curve.
     out : path, optional
-        Folder for ``comparison.json`` and one folder per fit; default ``data/fits/<dataset>``.
+        Folder for ``comparison.json`` and one folder per fit; default ``fits`` beside the
+        dataset.
     tracking : bool
         Keep a record in MLflow under `runs`; changes no result.
 
@@ -77,7 +78,7 @@ def train(
 
     chosen_specs = read_model_specs(list(specs) or [resource("models/specs/reference_mlp.yaml")])
     table = _read(open_dataset(dataset), chosen_specs, dataset)
-    out = Path("data") / "fits" / dataset.stem if out is None else out
+    out = dataset.parent / "fits" if out is None else out
     require_writable(out)
     parts = len(chosen_specs) + 1
     fits = [
