@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray: TypeAlias = NDArray[np.float64]
+IntArray: TypeAlias = NDArray[np.int64]
 
 
 class EndMode(IntEnum):
@@ -92,3 +98,31 @@ class NearFieldSettings(NamedTuple):
     quadratic_viscosity: float = 1.5
     linear_viscosity: float = 0.15
     history_points: int = 64
+
+
+class NearFieldColumns(NamedTuple):
+    """Many holes as columns: the fields of `Rock` and `Hole`, SI.
+
+    Attributes
+    ----------
+    explosive : int array (n,)
+        Index of the explosive of every row.
+    density, young_modulus, poisson_ratio, ucs, friction_angle, dilation_angle,
+    tensile_strength : array (n,)
+        As in `Rock`.
+    diameter, charge_diameter, rise_time, in_situ_stress : array (n,)
+        As in `Hole`.
+    """
+
+    explosive: IntArray
+    density: FloatArray
+    young_modulus: FloatArray
+    poisson_ratio: FloatArray
+    ucs: FloatArray
+    friction_angle: FloatArray
+    dilation_angle: FloatArray
+    tensile_strength: FloatArray
+    diameter: FloatArray
+    charge_diameter: FloatArray
+    rise_time: FloatArray
+    in_situ_stress: FloatArray
