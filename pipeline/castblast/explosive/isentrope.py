@@ -240,6 +240,30 @@ def _end_work(isentrope: ProductIsentrope, i: int, x: float) -> float:
 
 
 @kernel
+def gas_state(isentrope: ProductIsentrope, relative_volume: float) -> tuple[float, float, float]:
+    """Pressure [Pa], exponent k [-] and energy [J m-3] at a relative volume > 0, at one go.
+
+    The same laws as `pressure`, `slope` and `energy`; a JWL law shares its exponentials.
+    """
+    if isentrope.tabulated:
+        return (
+            pressure(isentrope, relative_volume),
+            slope(isentrope, relative_volume),
+            energy(isentrope, relative_volume),
+        )
+    v = relative_volume
+    first = isentrope.a * np.exp(-isentrope.r1 * v)
+    second = isentrope.b * np.exp(-isentrope.r2 * v)
+    tail = isentrope.c * np.exp(-isentrope.omega * np.log(v))
+    p = first + second + tail / v
+    stiffness = v * (isentrope.r1 * first + isentrope.r2 * second) + (1.0 + isentrope.omega) * (
+        tail / v
+    )
+    left = first / isentrope.r1 + second / isentrope.r2 + tail / isentrope.omega
+    return p, stiffness / p, left
+
+
+@kernel
 def inside_table(isentrope: ProductIsentrope, relative_volume: float) -> bool:
     """Say whether a relative volume lies within the table, up to `TABLE_MARGIN` beyond its ends."""
     if not isentrope.tabulated:
