@@ -6,17 +6,11 @@ from math import isnan, pi, radians
 
 import pytest
 
-from castblast.blast import (
-    BlastSettings,
-    design_faults,
-    make_case,
-    resolve_inputs,
-    result_values,
-    run_blast,
-)
+from castblast.blast import BlastSettings, make_case, result_values, run_blast
 from castblast.burden.case import BurdenParameters
 from castblast.errors import SpecError, Status
 from castblast.explosive.isentrope import Explosive, in_hole_velocity, jwl_isentrope
+from castblast.inputs import design_faults, resolve_inputs
 from castblast.nearfield.case import EndMode, TensionMode
 from castblast.variables import BURDEN_PARAMETER_SETS, INPUT_NAMES, INPUTS, OUTPUT_NAMES
 

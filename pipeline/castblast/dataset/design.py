@@ -22,11 +22,13 @@ from scipy.stats import qmc
 
 from castblast.dataset.simulation import Columns, FloatArray, Simulator, fault_kind
 from castblast.errors import SpecError
-from castblast.specs.recipe import Constraints, Recipe, VariableSpec
+from castblast.inputs import BoolArray
+from castblast.specs.recipe import Recipe, VariableSpec
 from castblast.variables import VARIABLES
 
-#: A first batch with a smaller share of possible rows stops the build.
-LEAST_ACCEPTANCE = 0.02
+#: A recipe with a smaller share of possible rows is refused: what is left of a Latin hypercube
+#: of which most was dropped is hardly one, and other ranges (or ratios) say better what is meant.
+LEAST_ACCEPTANCE = 0.5
 #: Rows tried before anything else, where the recipe asks for fewer.
 _PILOT_ROWS = 500
 _MOST_BATCHES = 1000
@@ -39,17 +41,18 @@ class Design(NamedTuple):
     Attributes
     ----------
     sample : (n,) int32
-        Stable ids, 0 to n - 1.
+        Stable ids, consecutive.
     columns : dict of (n,) [SI]
         Sampled and fixed variables of the recipe.
     inputs : dict of (n,) [SI]
-        Every input of the physics, defaults and derived ones included.
+        Every input of the physics, defaults and derived ones included; read-only, and shared
+        with `columns` where that saves memory.
     explosive : (n,) int8
         Index into the explosives of the recipe.
     split : (n,) int8
         Index into `specs.recipe.SPLIT_NAMES`.
     batch : (n,) int16
-        Latin-hypercube batch the row was drawn in, 0 the first.
+        Latin-hypercube batch the row was drawn in, 0 the first of all.
     drawn : int
         Rows drawn until n were possible.
     """
@@ -69,39 +72,106 @@ def make_design(recipe: Recipe, simulator: Simulator, where: str) -> Design:
     Raises
     ------
     SpecError
-        Next to none of the rows are possible; the message names the constraints that refuse them.
+        Most rows are impossible; the message names the constraints that refuse them.
     """
+    return _draw_rows(recipe, simulator, where, count=recipe.size, first_sample=0, first_batch=0)
+
+
+def extend_design(
+    recipe: Recipe,
+    simulator: Simulator,
+    where: str,
+    *,
+    add: int,
+    first_sample: int,
+    first_batch: int,
+) -> Design:
+    """Draw more rows for a recipe that has rows already.
+
+    The new rows are Latin hypercubes of their own: each half of the whole is spread evenly. Old
+    rows keep everything, their split included; the new ones are dealt to the splits by the shares
+    of the recipe.
+
+    Parameters
+    ----------
+    add : int
+        New rows; the size of the recipe does not matter.
+    first_sample, first_batch : int
+        One more than the largest sample id and batch number so far. Every batch number has its
+        own stream of the seed, so that the same steps give the same rows.
+
+    Returns
+    -------
+    Design
+        The new rows alone; see `join_designs`.
+
+    Raises
+    ------
+    SpecError
+        As `make_design`.
+    """
+    return _draw_rows(
+        recipe, simulator, where, count=add, first_sample=first_sample, first_batch=first_batch
+    )
+
+
+def join_designs(parts: Sequence[Design]) -> Design:
+    """Put designs of one recipe one after the other."""
+    return Design(
+        sample=np.concatenate([part.sample for part in parts]),
+        columns=_join([part.columns for part in parts]),
+        inputs=_join([part.inputs for part in parts]),
+        explosive=np.concatenate([part.explosive for part in parts]),
+        split=np.concatenate([part.split for part in parts]),
+        batch=np.concatenate([part.batch for part in parts]),
+        drawn=sum(part.drawn for part in parts),
+    )
+
+
+def _draw_rows(
+    recipe: Recipe,
+    simulator: Simulator,
+    where: str,
+    *,
+    count: int,
+    first_sample: int,
+    first_batch: int,
+) -> Design:
+    """Draw `count` possible rows with ids and batch numbers from the given ones on."""
     _require_possible(recipe, simulator, where)
-    size = recipe.size
     kept: list[dict[str, FloatArray]] = []
-    batches: list[int] = []
-    missing, drawn = size, 0
-    for number in range(_MOST_BATCHES):
-        columns = draw_batch(recipe, missing, _stream(recipe, _BATCHES, number))
-        possible = np.array([not fault for fault in row_faults(recipe, simulator, columns)])
-        kept.append({name: values[possible] for name, values in columns.items()})
-        batches += [number] * int(possible.sum())
+    batches: list[NDArray[np.int16]] = []
+    missing, drawn = count, 0
+    for number in range(first_batch, first_batch + _MOST_BATCHES):
+        rows = draw_batch(recipe, missing, _stream(recipe, _BATCHES, number))
+        possible = _possible(recipe, simulator, rows)
+        kept.append({name: values[possible] for name, values in rows.items()})
+        batches.append(np.full(np.count_nonzero(possible), number, dtype=np.int16))
         drawn += missing
-        missing = size - len(batches)
+        missing -= len(batches[-1])
         if missing == 0:
             break
     else:
         message = (
-            f"{where}: variables: {missing} of {size} designs are still impossible after {drawn} "
+            f"{where}: variables: {missing} of {count} designs are still impossible after {drawn} "
             "were drawn"
         )
         raise SpecError(message)
-    joined = {name: np.concatenate([part[name] for part in kept]) for name in kept[0]}
-    explosive = _balanced(size, len(recipe.explosives), _stream(recipe, _EXPLOSIVES, 0))
+    columns = _join(kept)
+    explosive = _balanced(count, len(recipe.explosives), _stream(recipe, _EXPLOSIVES, first_batch))
     return Design(
-        sample=np.arange(size, dtype=np.int32),
-        columns=joined,
-        inputs=simulator.resolve(joined, explosive),
+        sample=np.arange(first_sample, first_sample + count, dtype=np.int32),
+        columns=columns,
+        inputs=simulator.resolve(columns, explosive),
         explosive=explosive,
-        split=split_labels(size, recipe.split.shares, _stream(recipe, _SPLITS, 0)),
-        batch=np.array(batches, dtype=np.int16),
+        split=split_labels(count, recipe.split.shares, _stream(recipe, _SPLITS, first_batch)),
+        batch=np.concatenate(batches),
         drawn=drawn,
     )
+
+
+def _join(parts: Sequence[Columns]) -> dict[str, FloatArray]:
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def draw_batch(recipe: Recipe, count: int, rng: np.random.Generator) -> dict[str, FloatArray]:
@@ -125,16 +195,21 @@ def draw_batch(recipe: Recipe, count: int, rng: np.random.Generator) -> dict[str
 def row_faults(recipe: Recipe, simulator: Simulator, columns: Columns) -> list[str]:
     """Say for every row what makes it impossible; the physics first, then the constraints."""
     faults = simulator.faults(columns)
-    possible = np.array([not fault for fault in faults])
-    if not possible.any():
-        return faults
-    rows = {name: values[possible] for name, values in columns.items()}
-    # The constraints need derived lengths, which do not depend on the explosive.
-    inputs = simulator.resolve(rows, np.zeros(int(possible.sum()), dtype=np.int8))
-    broken = _constraint_faults(recipe.constraints, inputs)
-    for i, fault in zip(np.flatnonzero(possible), broken, strict=True):
-        faults[i] = fault
+    rows = np.array([i for i, fault in enumerate(faults) if not fault], dtype=np.int64)
+    broken = _broken_constraints(recipe, simulator, _take(columns, rows))
+    for text, mask in reversed(broken.items()):  # the first constraint has the last word
+        for i in rows[mask].tolist():
+            faults[i] = f"constraints: {text}"
     return faults
+
+
+def _possible(recipe: Recipe, simulator: Simulator, columns: Columns) -> BoolArray:
+    """Rows that neither the physics nor a constraint refuses."""
+    possible = simulator.possible(columns)
+    rows = np.flatnonzero(possible)
+    for mask in _broken_constraints(recipe, simulator, _take(columns, rows)).values():
+        possible[rows[mask]] = False
+    return possible
 
 
 def split_labels(size: int, shares: Sequence[float], rng: np.random.Generator) -> NDArray[np.int8]:
@@ -173,30 +248,38 @@ def _balanced(size: int, kinds: int, rng: np.random.Generator) -> NDArray[np.int
     return rng.permutation((np.arange(size) % kinds).astype(np.int8))
 
 
-def _constraint_faults(rules: Constraints, inputs: Columns) -> list[str]:
-    """First broken constraint of every row."""
+def _broken_constraints(
+    recipe: Recipe, simulator: Simulator, columns: Columns
+) -> dict[str, BoolArray]:
+    """Every constraint of the recipe in words, and the rows (n,) that break it.
+
+    Parameters
+    ----------
+    columns : dict of (n,)
+        Rows that the physics does not refuse.
+    """
+    rules = recipe.constraints
+    # The constraints need derived lengths, which do not depend on the explosive.
+    count = len(next(iter(columns.values())))
+    inputs = simulator.resolve(columns, np.zeros(count, dtype=np.int8))
     ratio = inputs["stemming_length"] / inputs["burden"]
-    charge = inputs["charge_length"]
     # A rounding margin: a ratio sampled between the very bounds of the rule is allowed.
     low = rules.minimum_stemming_ratio * (1.0 - 1e-12)
-    high = np.inf
+    shortest = VARIABLES["charge_length"].show(rules.minimum_charge_length)
+    broken = {f"stemming_length below {rules.minimum_stemming_ratio:g} burden": ratio < low}
     if rules.maximum_stemming_ratio is not None:
         high = rules.maximum_stemming_ratio * (1.0 + 1e-12)
-    shortest = VARIABLES["charge_length"].show(rules.minimum_charge_length)
-    table = (
-        (ratio < low, f"stemming_length below {rules.minimum_stemming_ratio:g} burden"),
-        (ratio > high, f"stemming_length above {rules.maximum_stemming_ratio} burden"),
-        (charge < rules.minimum_charge_length * (1.0 - 1e-12), f"charge_length below {shortest}"),
-    )
-    faults = [""] * len(ratio)
-    for mask, text in table:
-        for i in np.flatnonzero(mask):
-            faults[i] = faults[i] or f"constraints: {text}"
-    return faults
+        broken[f"stemming_length above {rules.maximum_stemming_ratio:g} burden"] = ratio > high
+    too_short = inputs["charge_length"] < rules.minimum_charge_length * (1.0 - 1e-12)
+    return broken | {f"charge_length below {shortest}": too_short}
+
+
+def _take(columns: Columns, rows: NDArray[np.int64]) -> dict[str, FloatArray]:
+    return {name: values[rows] for name, values in columns.items()}
 
 
 def _require_possible(recipe: Recipe, simulator: Simulator, where: str) -> None:
-    """Stop where next to nothing can be simulated, before anything is."""
+    """Stop where most rows are impossible, before anything is simulated."""
     count = max(_PILOT_ROWS, min(recipe.size, 4 * _PILOT_ROWS))
     columns = draw_batch(recipe, count, _stream(recipe, _PILOT, 0))
     faults = [fault for fault in row_faults(recipe, simulator, columns) if fault]
@@ -210,6 +293,7 @@ def _require_possible(recipe: Recipe, simulator: Simulator, where: str) -> None:
     ]
     message = (
         f"{where}: variables: {len(faults) / count:.1%} of the designs in these ranges are "
-        f"impossible; nothing was run. Refused are {'; '.join(lines)}"
+        f"impossible, at most {1.0 - LEAST_ACCEPTANCE:.0%} may be; nothing was run. Refused are "
+        f"{'; '.join(lines)}"
     )
     raise SpecError(message)

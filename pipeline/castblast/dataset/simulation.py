@@ -15,22 +15,22 @@ from typing import NamedTuple, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.blast import (
-    BlastSettings,
-    design_faults,
-    make_case,
-    resolve_inputs,
-    result_values,
-    run_blast,
-)
+from castblast.blast import BlastSettings, make_case, result_values, run_blast
 from castblast.errors import Status
 from castblast.explosive.isentrope import Explosive
+from castblast.inputs import (
+    BoolArray,
+    FaultyRows,
+    InputColumns,
+    IntArray,
+    design_fault_columns,
+    resolve_columns,
+)
 from castblast.nearfield.case import EndMode, TensionMode
 from castblast.specs.recipe import Recipe
 from castblast.variables import OUTPUT_NAMES
 
 FloatArray: TypeAlias = NDArray[np.float64]
-IntArray: TypeAlias = NDArray[np.integer]
 #: Names of variables to values (n,), SI.
 Columns: TypeAlias = Mapping[str, FloatArray]
 
@@ -63,6 +63,10 @@ class Simulator(Protocol):
     @property
     def output_names(self) -> tuple[str, ...]:
         """Names of the outputs of every row."""
+        ...
+
+    def possible(self, columns: Columns) -> BoolArray:
+        """Tell possible rows (n,) from impossible ones."""
         ...
 
     def faults(self, columns: Columns) -> list[str]:
@@ -100,21 +104,23 @@ class BlastSimulator:
         """Every output of `castblast.variables`."""
         return OUTPUT_NAMES
 
+    def possible(self, columns: Columns) -> BoolArray:
+        """Rows that break no rule of `inputs.design_fault_columns`."""
+        faulty: BoolArray = np.any([fault.rows for fault in self._faults(columns)], axis=0)
+        return ~faulty
+
     def faults(self, columns: Columns) -> list[str]:
-        """First fault of every row by `blast.design_faults`."""
-        return ["; ".join(design_faults(row)[:1]) for row in _rows(columns)]
+        """First fault of every row by `inputs.design_fault_columns`."""
+        lines = [""] * _count(columns)
+        for fault in reversed(self._faults(columns)):  # the first rule has the last word
+            for row in np.flatnonzero(fault.rows).tolist():
+                lines[row] = fault.say(row)
+        return lines
 
     def resolve(self, columns: Columns, explosive: IntArray) -> dict[str, FloatArray]:
-        """Every input of every row by `blast.resolve_inputs`."""
-        resolved = [
-            resolve_inputs(
-                {**row, **self.solver_inputs},
-                self.explosives[index],
-                self.settings.parameter_set,
-            )
-            for row, index in zip(_rows(columns), explosive, strict=True)
-        ]
-        return {name: np.array([row[name] for row in resolved]) for name in resolved[0]}
+        """Every input of every row by `inputs.resolve_columns`."""
+        values: InputColumns = {**columns, **self.solver_inputs}
+        return resolve_columns(values, self.explosives, explosive, self.settings.parameter_set)
 
     def run(self, inputs: Columns, explosive: IntArray) -> BatchResult:
         """Simulate resolved rows one after the other."""
@@ -133,6 +139,9 @@ class BlastSimulator:
                 for name in HISTORY_NAMES:
                     histories[name][i] = getattr(result.near_field, name)
         return BatchResult(status, outputs, histories)
+
+    def _faults(self, columns: Columns) -> list[FaultyRows]:
+        return design_fault_columns(columns, _count(columns))
 
 
 def blast_simulator(recipe: Recipe, explosives: tuple[Explosive, ...]) -> BlastSimulator:
@@ -156,6 +165,10 @@ def blast_simulator(recipe: Recipe, explosives: tuple[Explosive, ...]) -> BlastS
 def fault_kind(fault: str) -> str:
     """Reduce a fault to its kind by dropping the numbers of its row."""
     return _NUMBER.sub("#", fault)
+
+
+def _count(columns: Columns) -> int:
+    return len(next(iter(columns.values())))
 
 
 def _rows(columns: Columns) -> list[dict[str, float]]:

@@ -7,16 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from castblast.blast import (
-    BlastResult,
-    BlastSettings,
-    make_case,
-    resolve_inputs,
-    result_values,
-    run_blast,
-)
+from castblast.blast import BlastResult, BlastSettings, make_case, result_values, run_blast
 from castblast.errors import SimulationError, Status
 from castblast.files import write_csv, write_text
+from castblast.inputs import resolve_inputs
 from castblast.nearfield.case import EndMode, TensionMode
 from castblast.specs.case import parse_values
 from castblast.specs.explosive import load_explosive
