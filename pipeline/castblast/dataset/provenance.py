@@ -27,7 +27,7 @@ from castblast.variables import VARIABLES
 
 #: Sources that can change a number of a dataset.
 SOURCES = (
-    "explosive", "kernel.py", "nearfield", "burden", "blast.py", "variables.py",
+    "explosive", "kernel.py", "nearfield", "burden", "inputs.py", "blast.py", "variables.py",
     "dataset/design.py", "dataset/simulation.py",
 )  # fmt: skip
 _LIBRARIES = ("numpy", "scipy", "numba")
