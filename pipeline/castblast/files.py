@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import io
-import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from uuid import uuid4
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,10 +14,11 @@ from numpy.typing import ArrayLike
 def write_with(path: Path, writer: Callable[[Path], object]) -> Path:
     """Let `writer` write to a temporary name beside `path`, then put the file in its place.
 
-    The temporary name keeps the suffix, by which many writers choose the format.
+    The temporary name keeps the suffix, by which many writers choose the format. It is nobody
+    else's: threads and machines that share the folder may write the same file at the same time.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}.tmp{path.suffix}")
+    temporary = path.with_name(f".{path.stem}.{uuid4().hex[:12]}.tmp{path.suffix}")
     try:
         writer(temporary)
         temporary.replace(path)

@@ -10,12 +10,12 @@ import pytest
 from fake_blast import fake_generate, fake_simulator, write_recipe
 
 from castblast.dataset.check import check
+from castblast.dataset.content import content_hash
 from castblast.dataset.schema import (
     DESCRIPTORS,
     HISTORIES,
     LABELS,
     REQUIRED_ATTRIBUTES,
-    content_hash,
     flag_names,
     names_with_role,
 )

@@ -1,8 +1,12 @@
-"""The finished dataset from its design and the results of all its rows."""
+"""The finished dataset from its design and the results of its rows, block by block.
+
+Whole columns exist of the design only; results come shard by shard and leave in blocks whose size
+has nothing to do with that of the shards.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -10,58 +14,94 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from castblast.dataset.design import Design
-from castblast.dataset.provenance import ExplosiveSource, global_attributes
+from castblast.dataset.provenance import ExplosiveSource
 from castblast.dataset.schema import (
     DESCRIPTORS,
     HISTORIES,
     LABELS,
-    content_hash,
     label_attributes,
     output_role,
     variable_attributes,
 )
 from castblast.dataset.simulation import BatchResult, FloatArray
-from castblast.errors import Status
+from castblast.dataset.store import BLOCK_ROWS
 from castblast.explosive.isentrope import energy, pressure
-from castblast.specs.recipe import Recipe, RecipeSource
+from castblast.specs.recipe import Recipe
 
 
 def assemble(
-    source: RecipeSource,
+    recipe: Recipe,
     explosives: tuple[ExplosiveSource, ...],
     design: Design,
-    results: BatchResult,
-) -> xr.Dataset:
-    """Put design and results of all rows into one dataset, with its content hash.
+    results: Iterable[BatchResult],
+) -> Iterator[xr.Dataset]:
+    """Put design and results together, `BLOCK_ROWS` rows at a time, without global attributes.
 
     Parameters
     ----------
-    results : BatchResult
-        Rows in the order of the design.
+    results : iterable of BatchResult
+        Of all rows in the order of the design, in parts of any length.
     """
-    columns = _labels(explosives, design, results)
-    columns |= _inputs(source.recipe, design)
-    for name, values in results.outputs.items():
-        columns[name] = ("sample", values, variable_attributes(name, output_role(name)))
-    columns |= history_columns(results.histories)
-    columns |= _descriptors(explosives)
-    failed = int(np.count_nonzero(results.status != Status.OK))
-    dataset = xr.Dataset(
-        data_vars=columns,
-        coords={"sample": ("sample", design.sample, label_attributes("sample"))},
-        attrs=global_attributes(
-            source,
-            explosives,
-            drawn=design.drawn,
-            n_ok=len(design.sample) - failed,
-            n_failed=failed,
-        ),
+    inputs = _inputs(recipe, design)
+    descriptors = _descriptors(explosives)
+    begin = 0
+    for part in regroup(results, BLOCK_ROWS):
+        rows = slice(begin, begin + len(part.status))
+        columns = _labels(explosives, design, part.status, rows)
+        columns |= {
+            name: (dims, values[rows] if dims else values, attributes)
+            for name, (dims, values, attributes) in inputs.items()
+        }
+        for name, values in part.outputs.items():
+            columns[name] = ("sample", values, variable_attributes(name, output_role(name)))
+        columns |= _histories(part.histories)
+        columns |= descriptors
+        sample = ("sample", design.sample[rows], label_attributes("sample"))
+        yield xr.Dataset(data_vars=columns, coords={"sample": sample})
+        begin = rows.stop
+
+
+def regroup(parts: Iterable[BatchResult], rows: int) -> Iterator[BatchResult]:
+    """Join parts of any length to parts of `rows` rows; the last one holds what is left."""
+    held: list[BatchResult] = []
+    count = 0
+    for part in parts:
+        held.append(part)
+        count += len(part.status)
+        if count < rows:
+            continue
+        joined = _joined(held)
+        whole = count - count % rows
+        for begin in range(0, whole, rows):
+            yield _rows_of(joined, slice(begin, begin + rows))
+        held, count = [_rows_of(joined, slice(whole, count))], count - whole
+    if count:
+        yield _joined(held)
+
+
+def _joined(parts: list[BatchResult]) -> BatchResult:
+    first = parts[0]
+    return BatchResult(
+        status=np.concatenate([part.status for part in parts]),
+        outputs={
+            name: np.concatenate([part.outputs[name] for part in parts]) for name in first.outputs
+        },
+        histories={
+            name: np.concatenate([part.histories[name] for part in parts])
+            for name in first.histories
+        },
     )
-    dataset.attrs["content_sha256"] = content_hash(dataset)
-    return dataset
 
 
-def history_columns(histories: Mapping[str, FloatArray]) -> dict[str, Any]:
+def _rows_of(part: BatchResult, rows: slice) -> BatchResult:
+    return BatchResult(
+        status=part.status[rows],
+        outputs={name: values[rows] for name, values in part.outputs.items()},
+        histories={name: values[rows] for name, values in part.histories.items()},
+    )
+
+
+def _histories(histories: Mapping[str, FloatArray]) -> dict[str, Any]:
     """Histories as columns of shape (sample, history_point), in single precision."""
     return {
         name: (
@@ -74,14 +114,17 @@ def history_columns(histories: Mapping[str, FloatArray]) -> dict[str, Any]:
 
 
 def _labels(
-    explosives: tuple[ExplosiveSource, ...], design: Design, results: BatchResult
+    explosives: tuple[ExplosiveSource, ...],
+    design: Design,
+    status: NDArray[np.int8],
+    rows: slice,
 ) -> dict[str, Any]:
     names = tuple(entry.name for entry in explosives)
     values: dict[str, NDArray[Any]] = {
-        "explosive": design.explosive,
-        "split": design.split,
-        "status": results.status,
-        "design_batch": design.batch,
+        "explosive": design.explosive[rows],
+        "split": design.split[rows],
+        "status": status,
+        "design_batch": design.batch[rows],
     }
     return {
         name: (LABELS[name][1], array.astype(LABELS[name][0]), label_attributes(name, names))
@@ -103,11 +146,11 @@ def _inputs(recipe: Recipe, design: Design) -> dict[str, Any]:
             }
             if spec.ratio_of is not None:
                 attributes["sampled_as_ratio_of"] = spec.ratio_of
-            columns[name] = ("sample", values, attributes)
+            columns[name] = (("sample",), values, attributes)
         elif (values == values[0]).all():
             columns[name] = ((), values[0], variable_attributes(name, "fixed"))
         else:
-            columns[name] = ("sample", values, variable_attributes(name, "derived"))
+            columns[name] = (("sample",), values, variable_attributes(name, "derived"))
     return columns
 
 

@@ -1,10 +1,12 @@
 """Shards on workers: the only place that knows Dask.
 
-Rows go to workers in shards that last a second or more, so that scheduling costs next to nothing.
-Workers write their shard to disk and send a few numbers home; what counts is which valid shards
-lie in the work folder, so a run that was killed, or lost a worker, goes on where it stopped, and
-the number of workers cannot change a byte. By default workers are threads of this process (the
-kernels release the interpreter lock); the address of any running scheduler may be given instead.
+Rows go to workers in shards that last a second or so, so that scheduling costs next to nothing, and
+only a few shards per worker are under way at a time, so that neither scheduler nor client grows
+with the dataset. Workers write their shard to disk and send a byte per row home; what counts is
+which valid shards lie in the work folder, so a run that was killed, or lost a worker, goes on where
+it stopped, and the number of workers cannot change a byte. By default workers are threads of this
+process (the kernels release the interpreter lock); the address of any running scheduler may be
+given instead.
 """
 
 from __future__ import annotations
@@ -12,26 +14,33 @@ from __future__ import annotations
 import logging
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from castblast.dataset.shards import ShardReport, ShardTask, run_shard, split_valid
-from castblast.errors import DatasetError, SpecError
+from castblast.dataset.meter import Meter
+from castblast.dataset.shards import ShardReport, ShardTask, run_shard
+from castblast.dataset.work import Work
+from castblast.errors import DatasetError, SimulationError, SpecError
 from castblast.progress import ProgressCallback, silent
 
+#: Share of the time of the workers that scheduling may cost before the log remarks on it.
+MOST_SCHEDULING = 0.03
+#: Shards under way per worker thread: one being simulated, the others ready beside it.
+IN_FLIGHT = 3
 _CONNECT_SECONDS = 10
+_COUNT_SECONDS = 5.0
 _RETRIES = 2
 
 
 def build_shards(
-    tasks: list[ShardTask],
+    work: Work,
     *,
     workers: int | None = None,
     scheduler: str | None = None,
     progress: ProgressCallback = silent,
 ) -> list[str]:
-    """Run every task that has no valid shard yet.
+    """Simulate every row that is in no valid shard yet.
 
     Parameters
     ----------
@@ -50,30 +59,32 @@ def build_shards(
     SpecError
         No scheduler answers at the address, or it has no workers.
     DatasetError
-        A shard cannot be written.
+        A shard cannot be written, or the scheduler went away.
+    SimulationError
+        A shard brought several workers down.
     """
-    done, todo, aside = split_valid(tasks)
+    valid, aside = work.resume(progress)
+    total = len(work.status)
     lines = []
-    if done or aside:
+    if valid or aside:
+        todo = sum(1 for _ in work.missing())
         note = f", {aside} cut shard{'s' if aside > 1 else ''} moved aside" if aside else ""
-        lines.append(f"resume: {len(done)} of {len(tasks)} shards valid{note}, {len(todo)} to do")
-    if not todo:
+        lines.append(f"resume: {valid} of {valid + todo} shards valid{note}, {todo} to do")
+    first = next(work.tasks(), None)
+    if first is None:
         return lines
-    finished = sum(len(task.sample) for task in done)
-    total = finished + sum(len(task.sample) for task in todo)
-    fresh = failed = 0
-    with _quiet_dask(), _client(workers, scheduler) as client:
-        progress(finished / total, "; ".join([*lines, "compiling, once per installation"]))
-        _warm(todo[0])
-        begin = time.perf_counter()
-        for report in _reports(client, todo):
-            fresh += report.rows
-            failed += report.failed
-            rate = fresh / (time.perf_counter() - begin)
-            line = _progress_line(finished + fresh, total, failed, rate)
-            progress((finished + fresh) / total, line)
-        seconds = time.perf_counter() - begin
-    return [*lines, f"{fresh} samples in {seconds:.1f} s, {fresh / seconds:.0f} samples/s"]
+    with _quiet_dask(), _client(workers, scheduler) as (client, threads):
+        share = work.done / total
+        progress(share, "; ".join([*lines, "compiling, once per installation"]))
+        if scheduler is None:
+            _warm(first)
+        meter = Meter()
+        for report in _reports(client, work.tasks(), threads):
+            work.mark(report.span, report.status)
+            meter.add(report)
+            progress(work.done / total, _progress_line(work, meter))
+        lines += _summary(meter, threads())
+    return lines
 
 
 def _warm(task: ShardTask) -> None:
@@ -83,8 +94,10 @@ def _warm(task: ShardTask) -> None:
     )
 
 
-def _reports(client: Any, tasks: list[ShardTask]) -> Iterator[ShardReport]:
-    """Run tasks on a cluster and yield their reports as they come.
+def _reports(
+    client: Any, tasks: Iterator[ShardTask], threads: Callable[[], int]
+) -> Iterator[ShardReport]:
+    """Run tasks on a cluster, a few per worker at a time, and yield their reports as they come.
 
     A future that was yielded need not be finished: when its worker dies, it goes back to waiting.
     Only "finished" and "error" are taken at their word; lost work is handed out again.
@@ -92,58 +105,131 @@ def _reports(client: Any, tasks: list[ShardTask]) -> Iterator[ShardReport]:
     from dask.distributed import as_completed
 
     run = os.urandom(4).hex()  # keys of an earlier run must not answer for this one
-    futures = {}
+    running: dict[str, ShardTask] = {}
+    waiting = as_completed(loop=client.loop)
 
-    def submit(task: ShardTask) -> Any:
-        future = client.submit(
-            run_shard, task, key=f"castblast-{run}-{task.index}", retries=_RETRIES, pure=False
-        )
-        futures[future.key] = task
-        return future
+    def submit(task: ShardTask) -> None:
+        key = f"castblast-{run}-{task.span.begin}"
+        running[key] = task
+        waiting.add(client.submit(run_shard, task, key=key, retries=_RETRIES, pure=False))
 
-    waiting = as_completed([submit(task) for task in tasks], loop=client.loop)
+    def fill() -> None:
+        for _ in range(IN_FLIGHT * max(1, threads()) - len(running)):
+            task = next(tasks, None)
+            if task is None:
+                return
+            submit(task)
+
+    fill()
     for future in waiting:
         if future.status == "finished":
-            report = future.result()
-            if not futures.pop(future.key).path.exists():
+            report = _result(future)
+            if not running.pop(future.key).path.exists():
                 message = "the workers write to a folder that this machine does not see"
                 raise DatasetError(message)
+            future.release()
+            fill()
             yield report
         elif future.status == "error":
-            future.result()  # raises what the worker raised
+            _result(future)
+        elif client.status != "running":
+            message = "the scheduler went away; start it and run the same command again to go on"
+            raise DatasetError(message)
+        elif future.status in ("lost", "cancelled"):
+            submit(running[future.key])
         else:
-            if future.status in ("lost", "cancelled"):
-                future = submit(futures[future.key])
             waiting.add(future)
 
 
+def _result(future: Any) -> Any:
+    """Return the report of a future, or raise what its worker raised."""
+    from dask.distributed import KilledWorker
+
+    try:
+        return future.result()
+    except KilledWorker as fault:
+        message = (
+            f"{fault.allowed_failures + 1} workers died one after the other on one shard "
+            f"({future.key}); do they have enough memory? Finished shards are kept"
+        )
+        raise SimulationError(message) from None
+
+
 @contextmanager
-def _client(workers: int | None, scheduler: str | None) -> Iterator[Any]:
-    """Connect to `scheduler`, or start threads in this process."""
-    from dask.distributed import Client, LocalCluster
+def _client(workers: int | None, scheduler: str | None) -> Iterator[tuple[Any, Callable[[], int]]]:
+    """Connect to `scheduler`, or start threads in this process; yields also the count of threads.
+
+    A user who interrupts does not wait for the shards under way: they are made again.
+    """
+    from dask.distributed import Client
 
     if scheduler is not None:
-        try:
-            client = Client(scheduler, timeout=_CONNECT_SECONDS, set_as_default=False)
-        except (OSError, ValueError, ImportError) as fault:
-            message = f"--scheduler {scheduler}: no Dask scheduler answers there ({fault})"
-            raise SpecError(message) from None
-        with client:
-            if not client.scheduler_info()["workers"]:
-                message = f"--scheduler {scheduler}: it has no workers"
-                raise SpecError(message)
-            yield client
+        with _remote(scheduler) as client:
+            yield client, _ThreadCount(client)
         return
-    cluster = LocalCluster(
+    count = workers or _cores()
+    with _local_cluster(count) as cluster, Client(cluster, set_as_default=False) as client:
+        yield client, lambda: count
+
+
+@contextmanager
+def _remote(scheduler: str) -> Iterator[Any]:
+    from dask.distributed import Client
+
+    try:
+        client = Client(scheduler, timeout=_CONNECT_SECONDS, set_as_default=False)
+    except (OSError, ValueError, ImportError) as fault:
+        message = f"--scheduler {scheduler}: no Dask scheduler answers there ({fault})"
+        raise SpecError(message) from None
+    with client:
+        if not client.nthreads():
+            message = f"--scheduler {scheduler}: it has no workers"
+            raise SpecError(message)
+        yield client
+
+
+@contextmanager
+def _local_cluster(count: int) -> Iterator[Any]:
+    from dask.distributed import LocalCluster
+    from distributed.threadpoolexecutor import ThreadPoolExecutor
+
+    class Threads(ThreadPoolExecutor):  # type: ignore[misc]
+        """Threads that are left behind when there is no time to wait for them."""
+
+        abandoned = False
+
+        def shutdown(self, wait: bool = True, timeout: float | None = None) -> None:
+            super().shutdown(wait=wait and not self.abandoned, timeout=timeout)
+
+    threads = Threads(count, thread_name_prefix="castblast-worker")
+    with LocalCluster(
         n_workers=1,
-        threads_per_worker=workers or _cores(),
+        threads_per_worker=count,
+        executor=threads,
         processes=False,
         memory_limit=0,
         dashboard_address="127.0.0.1:0",  # any free port: a taken one makes Dask complain
         silence_logs=logging.CRITICAL,
-    )
-    with cluster, Client(cluster, set_as_default=False) as client:
-        yield client
+    ) as cluster:
+        try:
+            yield cluster
+        except KeyboardInterrupt:
+            threads.abandoned = True
+            raise
+
+
+class _ThreadCount:
+    """Threads of all workers of a scheduler, asked for now and then: workers come and go."""
+
+    def __init__(self, client: Any) -> None:
+        self._client = client
+        self._count, self._asked = 0, -_COUNT_SECONDS
+
+    def __call__(self) -> int:
+        now = time.monotonic()
+        if now - self._asked >= _COUNT_SECONDS:
+            self._count, self._asked = sum(self._client.nthreads().values()), now
+        return self._count
 
 
 @contextmanager
@@ -168,7 +254,20 @@ def _cores() -> int:
     return len(affinity(0)) if affinity else os.cpu_count() or 1
 
 
-def _progress_line(done: int, total: int, failed: int, rate: float) -> str:
-    left = round((total - done) / rate)
+def _progress_line(work: Work, meter: Meter) -> str:
+    total, done = len(work.status), work.done
+    left = round((total - done) / meter.rate)
     eta = f"{left // 3600}:{left // 60 % 60:02d}:{left % 60:02d}"
-    return f"{done}/{total} failed {failed} {rate:.0f} samples/s ETA {eta}"
+    rate = f"{meter.rate:.0f} samples/s"
+    return f"{done}/{total} failed {work.failed} {rate} {meter.memory} ETA {eta}"
+
+
+def _summary(meter: Meter, threads: int) -> list[str]:
+    """Rate, peak and what the workers did besides simulating."""
+    seconds, scheduling = meter.seconds, meter.scheduling_share
+    remark = "" if scheduling < MOST_SCHEDULING else " (much: larger shards would help)"
+    return [
+        f"{meter.rows} samples in {seconds:.1f} s, {meter.rate:.0f} samples/s, {meter.memory}",
+        f"of the workers' time: scheduling {scheduling:.1%}{remark}, idle at start and end "
+        f"{meter.idle_share(threads):.1%}",
+    ]

@@ -1,4 +1,4 @@
-"""The format of a near-field dataset: its columns, their attributes, and the hash of its content.
+"""The format of a near-field dataset: its columns and their attributes.
 
 `data_specs/FORMAT.md` states the same in words, `castblast.dataset.check` reports departures.
 Names, units and bounds come from `castblast.variables`; the few columns that only a dataset has are
@@ -7,7 +7,6 @@ defined here. Conventions: CF-1.11 (Eaton et al.) and ACDD-1.3.
 
 from __future__ import annotations
 
-import hashlib
 from typing import Any
 
 import numpy as np
@@ -125,33 +124,3 @@ def names_with_role(dataset: xr.Dataset, role: str) -> tuple[str, ...]:
         for name, variable in dataset.variables.items()
         if variable.attrs.get("role") == role and name in VARIABLES
     )
-
-
-def content_hash(dataset: xr.Dataset) -> str:
-    """SHA-256 (hex) over names, units, types, shapes and values, not over the container.
-
-    Each variable is hashed by itself, then the sorted list of these hashes, so that a file can be
-    hashed piece by piece along its samples.
-    """
-    lines = []
-    for name in sorted(map(str, dataset.variables)):
-        variable = dataset.variables[name]
-        lines.append(
-            f"{name} {variable.dims} {variable.shape} {_kind(variable)} "
-            f"{variable.attrs.get('units', '')} {_values_hash(variable)}"
-        )
-    return hashlib.sha256("\n".join(lines).encode()).hexdigest()
-
-
-def _kind(variable: xr.Variable) -> str:
-    return "str" if variable.dtype.kind in "OUT" else variable.dtype.newbyteorder("<").str
-
-
-def _values_hash(variable: xr.Variable) -> str:
-    values = variable.to_numpy()
-    if values.dtype.kind in "OUT":
-        return hashlib.sha256("\0".join(map(str, values.ravel())).encode()).hexdigest()
-    plain = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<"))
-    if plain.dtype.kind == "f":
-        plain = np.where(np.isnan(plain), np.array(np.nan, plain.dtype), plain)  # one NaN only
-    return hashlib.sha256(plain.tobytes()).hexdigest()

@@ -1,34 +1,45 @@
 """Shards: the part of a dataset that one task simulates and writes.
 
-A shard file is complete once it has its name, carries the hash of what it was made from and of its
-own content, and can therefore be trusted or refused by itself. That is all a stopped run needs to
-go on.
+A shard file holds a span of consecutive rows and is named by it. It is complete once it has its
+name and carries a seal over what it was made from and what it holds, so it can be trusted or
+refused by itself. That is all a stopped run needs to go on, and spans need not be the same from run
+to run. Shards are plain arrays (NPZ), not netCDF: they are for nobody else to read, are written
+within milliseconds, and keep the workers out of the HDF5 library with its one lock.
 """
 
 from __future__ import annotations
 
+import hashlib
+import re
+import threading
 import time
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
-from castblast.dataset.assemble import history_columns
-from castblast.dataset.design import Design
-from castblast.dataset.schema import (
-    content_hash,
-    label_attributes,
-    output_role,
-    variable_attributes,
-)
+from castblast.dataset.meter import peak_memory, process_name
 from castblast.dataset.simulation import HISTORY_NAMES, BatchResult, FloatArray, Simulator
-from castblast.dataset.store import read_file, write_dataset
-from castblast.errors import DatasetError, Status
+from castblast.errors import DatasetError
+from castblast.files import write_with
 
-SHARD_SCHEMA = "castblast shard"
+_NAME = re.compile(r"shard-(\d{9})-(\d{9})\.npz")
+_ORIGIN, _SEAL = "rows_sha256", "seal"
+
+
+class Span(NamedTuple):
+    """Rows `begin` to `end` - 1 of a design, by position."""
+
+    begin: int
+    end: int
+
+    @property
+    def file_name(self) -> str:
+        """Name of the shard of these rows."""
+        return f"shard-{self.begin:09d}-{self.end:09d}.npz"
 
 
 @dataclass(frozen=True)
@@ -37,152 +48,155 @@ class ShardTask:
 
     Attributes
     ----------
-    index : int
-    path : Path
-        File to write.
+    span : Span
+    folder : Path
+        Where to write.
     rows_sha256 : str
         Hash of what the dataset is made from.
     simulator : Simulator
-    sample : (n,) int32
     inputs : dict of (n,) [SI]
         Every input of the rows.
     explosive : (n,) int8
     """
 
-    index: int
-    path: Path
+    span: Span
+    folder: Path
     rows_sha256: str
     simulator: Simulator
-    sample: NDArray[np.int32]
     inputs: dict[str, FloatArray]
     explosive: NDArray[np.int8]
 
+    @property
+    def path(self) -> Path:
+        """File to write."""
+        return self.folder / self.span.file_name
+
 
 class ShardReport(NamedTuple):
-    """What a worker sends home: a few numbers, the rows are on disk."""
+    """What a worker sends home: a byte for every row and a few numbers; the rest is on disk.
 
-    shard: int
-    rows: int
-    failed: int
-    seconds: float
+    Attributes
+    ----------
+    span : Span
+    status : (n,) int8
+        `castblast.errors.Status` of each row.
+    worker : str
+        Thread that did it, unlike any other anywhere.
+    process : str
+        Process of that thread.
+    begin, end : float [s]
+        On a clock of the process.
+    peak_memory : int [byte]
+        Of the process so far.
+    """
 
-
-def make_tasks(
-    design: Design, simulator: Simulator, rows_sha256: str, folder: Path, shard_size: int
-) -> list[ShardTask]:
-    """Cut a design into tasks of `shard_size` consecutive rows."""
-    tasks = []
-    for index, start in enumerate(range(0, len(design.sample), shard_size)):
-        rows = slice(start, start + shard_size)
-        tasks.append(
-            ShardTask(
-                index=index,
-                path=folder / f"shard-{index:06d}.nc",
-                rows_sha256=rows_sha256,
-                simulator=simulator,
-                sample=design.sample[rows],
-                inputs={name: values[rows] for name, values in design.inputs.items()},
-                explosive=design.explosive[rows],
-            )
-        )
-    return tasks
+    span: Span
+    status: NDArray[np.int8]
+    worker: str
+    process: str
+    begin: float
+    end: float
+    peak_memory: int
 
 
 def run_shard(task: ShardTask) -> ShardReport:
-    """Simulate the rows of a task and write its file."""
+    """Simulate the rows of a task and write its file.
+
+    Raises
+    ------
+    DatasetError
+        The file cannot be written.
+    """
     begin = time.perf_counter()
     result = task.simulator.run(task.inputs, task.explosive)
-    write_dataset(_to_dataset(task, result), task.path)
-    failed = int(np.count_nonzero(result.status != Status.OK))
-    return ShardReport(task.index, len(task.sample), failed, time.perf_counter() - begin)
+    write_shard(task.folder, task.span, task.rows_sha256, result)
+    process = process_name()
+    return ShardReport(
+        span=task.span,
+        status=result.status,
+        worker=f"{process}-{threading.get_ident()}",
+        process=process,
+        begin=begin,
+        end=time.perf_counter(),
+        peak_memory=peak_memory(),
+    )
 
 
-def read_shard(task: ShardTask) -> BatchResult:
-    """Read the file of a task and make sure that it is its file, whole.
+def write_shard(folder: Path, span: Span, rows_sha256: str, result: BatchResult) -> Path:
+    """Write the results of a span; histories in single precision, as the dataset keeps them.
+
+    Raises
+    ------
+    DatasetError
+        The folder cannot be written to, or the disk is full.
+    """
+    arrays = {"status": np.asarray(result.status, dtype=np.int8), **result.outputs}
+    arrays |= {name: result.histories[name].astype(np.float32) for name in HISTORY_NAMES}
+    seal = _seal(span, rows_sha256, arrays)
+    path = folder / span.file_name
+
+    def write(name: Path) -> None:
+        np.savez(name, **arrays, **{_ORIGIN: np.array(rows_sha256), _SEAL: np.array(seal)})
+
+    try:
+        return write_with(path, write)
+    except OSError as fault:
+        message = f"{path}: cannot be written: {fault.strerror or fault}"
+        raise DatasetError(message) from None
+
+
+def read_shard(
+    folder: Path, span: Span, rows_sha256: str, output_names: tuple[str, ...]
+) -> BatchResult:
+    """Read the file of a span and make sure that it is its file, whole.
 
     Raises
     ------
     DatasetError
         Missing, cut, damaged, or made from something else.
     """
-    shard = read_file(task.path)
-    attributes = shard.attrs
-    if attributes.get("schema") != SHARD_SCHEMA:
-        message = f"{task.path}: is no shard"
+    path = folder / span.file_name
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            arrays = {str(name): stored[name] for name in stored.files}
+    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile) as fault:
+        message = f"{path}: is missing, cut or damaged ({type(fault).__name__})"
+        raise DatasetError(message) from None
+    origin, seal = str(arrays.pop(_ORIGIN, "")), str(arrays.pop(_SEAL, ""))
+    if origin != rows_sha256:
+        message = f"{path}: was made from something else"
         raise DatasetError(message)
-    if attributes.get("rows_sha256") != task.rows_sha256:
-        message = f"{task.path}: was made from another recipe"
+    if seal != _seal(span, origin, arrays):
+        message = f"{path}: is damaged (its seal is broken)"
         raise DatasetError(message)
-    if not np.array_equal(shard["sample"].to_numpy(), task.sample):
-        message = f"{task.path}: holds other samples"
-        raise DatasetError(message)
-    if attributes.get("content_sha256") != content_hash(shard):
-        message = f"{task.path}: is damaged (hash differs)"
+    if set(arrays) != {"status", *output_names, *HISTORY_NAMES}:
+        message = f"{path}: holds other variables"
         raise DatasetError(message)
     return BatchResult(
-        status=shard["status"].to_numpy(),
-        outputs={name: shard[name].to_numpy() for name in task.simulator.output_names},
-        histories={name: shard[name].to_numpy() for name in HISTORY_NAMES},
+        status=arrays["status"],
+        outputs={name: arrays[name] for name in output_names},
+        histories={name: arrays[name] for name in HISTORY_NAMES},
     )
 
 
-def split_valid(tasks: list[ShardTask]) -> tuple[list[ShardTask], list[ShardTask], int]:
-    """Tell finished tasks from those to do; files that cannot be trusted are moved aside.
+def find_spans(folder: Path) -> list[Span]:
+    """Spans that the shard files of a folder are named by, in order, without overlaps.
 
-    Returns
-    -------
-    done, todo : list of ShardTask
-    aside : int
-        Files renamed to ``*.cut``.
+    Of two that overlap, as runs with different sizes of shards may leave, the earlier one counts.
     """
-    done, todo, aside = [], [], 0
-    for task in tasks:
-        if not task.path.exists():
-            todo.append(task)
-            continue
-        try:
-            read_shard(task)
-        except DatasetError:
-            task.path.replace(task.path.with_suffix(".nc.cut"))
-            aside += 1
-            todo.append(task)
-        else:
-            done.append(task)
-    return done, todo, aside
+    named = (_NAME.fullmatch(path.name) for path in folder.glob("shard-*.npz"))
+    found = sorted(Span(int(match[1]), int(match[2])) for match in named if match)
+    spans: list[Span] = []
+    for span in found:
+        if span.begin < span.end and (not spans or spans[-1].end <= span.begin):
+            spans.append(span)
+    return spans
 
 
-def join_shards(tasks: list[ShardTask]) -> BatchResult:
-    """Read all files of finished tasks into columns in the order of the design.
-
-    Raises
-    ------
-    DatasetError
-        A shard is missing or damaged.
-    """
-    parts = [read_shard(task) for task in tasks]
-    first = parts[0]
-    return BatchResult(
-        status=np.concatenate([part.status for part in parts]),
-        outputs={
-            name: np.concatenate([part.outputs[name] for part in parts]) for name in first.outputs
-        },
-        histories={
-            name: np.concatenate([part.histories[name] for part in parts])
-            for name in first.histories
-        },
-    )
-
-
-def _to_dataset(task: ShardTask, result: BatchResult) -> xr.Dataset:
-    columns = {
-        name: ("sample", values, variable_attributes(name, output_role(name)))
-        for name, values in result.outputs.items()
-    }
-    columns["status"] = ("sample", result.status.astype(np.int8), label_attributes("status"))
-    dataset = xr.Dataset(
-        data_vars=columns | history_columns(result.histories),
-        coords={"sample": ("sample", task.sample, label_attributes("sample"))},
-        attrs={"schema": SHARD_SCHEMA, "rows_sha256": task.rows_sha256},
-    )
-    dataset.attrs["content_sha256"] = content_hash(dataset)
-    return dataset
+def _seal(span: Span, rows_sha256: str, arrays: dict[str, NDArray[np.generic]]) -> str:
+    digest = hashlib.sha256(f"{rows_sha256} {span.begin} {span.end}".encode())
+    for name in sorted(arrays):
+        values = np.ascontiguousarray(arrays[name])
+        digest.update(f" {name} {values.dtype.str} {values.shape} ".encode())
+        digest.update(values.data)
+    return digest.hexdigest()

@@ -1,13 +1,17 @@
 """Writing and reading dataset files: whole or not at all, and the same bytes every time.
 
 NetCDF-4 through the netCDF4 library, deflate level 4 with shuffle, which every reader knows. A file
-is written under another name, read back, flushed to the disk and renamed. One lock guards the HDF5
-library, which keeps global state and must not be entered by two threads.
+is written block by block under another name, read back by whoever writes it, flushed to the disk
+and renamed. Chunks and blocks have a fixed number of rows, so that the bytes depend on the content
+alone and neither writing nor reading ever holds more than one block, however long the dataset.
+One lock guards the HDF5 library, which keeps global state and must not be entered by two threads.
 """
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import RLock
 from typing import Any
@@ -18,13 +22,54 @@ from castblast.dataset.schema import SCHEMA, SCHEMA_VERSION
 from castblast.errors import DatasetError
 from castblast.files import write_with
 
+#: Rows of a chunk of the file: what has to be read for one sample.
+CHUNK_ROWS = 4096
+#: Rows that are written or read at a time, a multiple of the chunk.
+BLOCK_ROWS = 4 * CHUNK_ROWS
 _LOCK = RLock()
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _CLASSIC = b"CDF"
+_HOLES = ("target", "diagnostic", "history")
+
+
+def write_blocks(
+    name: Path, rows: int, blocks: Iterable[xr.Dataset], attributes: Mapping[str, Any] | None = None
+) -> None:
+    """Write a dataset of `rows` samples from blocks of consecutive rows, at `name` itself.
+
+    Parameters
+    ----------
+    rows : int
+        Samples of all blocks together.
+    blocks : iterable of xr.Dataset
+        At most one may have another number of rows than a multiple of `CHUNK_ROWS`: the last.
+        The first decides on variables and their attributes.
+    attributes : mapping, optional
+        Global attributes, looked at after the last block; default: those of the first block.
+    """
+    import netCDF4
+
+    with _LOCK, netCDF4.Dataset(name, "w", format="NETCDF4") as file:
+        begin, form = 0, None
+        for block in blocks:
+            if form is None:
+                form = block
+                _define(file, block, rows)
+            stop = begin + block.sizes.get("sample", 0)
+            for key, variable in block.variables.items():
+                if "sample" in variable.dims:
+                    file[key][begin:stop] = variable.to_numpy()
+                elif begin == 0:
+                    file[key][...] = variable.to_numpy()
+            begin = stop
+        if begin != rows or form is None:
+            message = f"{name}: {begin} rows came, {rows} were announced"
+            raise ValueError(message)
+        file.setncatts(dict(form.attrs if attributes is None else attributes))
 
 
 def write_dataset(dataset: xr.Dataset, path: Path) -> Path:
-    """Write a dataset so that `path` is complete once it exists.
+    """Write a dataset from memory so that `path` is complete once it exists.
 
     Raises
     ------
@@ -33,20 +78,45 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> Path:
     """
 
     def write(name: Path) -> None:
-        with _LOCK:
-            dataset.to_netcdf(name, engine="netcdf4", format="NETCDF4", encoding=_encoding(dataset))
-            with xr.open_dataset(name, engine="netcdf4", decode_times=False) as written:
-                if written.sizes != dataset.sizes:
-                    message = f"{path}: what was written cannot be read back"
-                    raise DatasetError(message)
-        with name.open("rb+") as stream:
-            os.fsync(stream.fileno())
+        with disk_faults(path):
+            write_blocks(name, dataset.sizes.get("sample", 0), row_blocks(dataset))
+            flush(name)
 
-    try:
+    with disk_faults(path):
         return write_with(path, write)
-    except (OSError, RuntimeError) as fault:  # a full disk is a RuntimeError of HDF5
+
+
+@contextmanager
+def disk_faults(path: Path) -> Iterator[None]:
+    """Turn what the libraries raise on a full or forbidden disk into one line about `path`.
+
+    Raises
+    ------
+    DatasetError
+        In place of an OSError, or of a RuntimeError of HDF5 (so it tells of a full disk).
+    """
+    try:
+        yield
+    except (OSError, RuntimeError) as fault:
         message = f"{path}: cannot be written (is the disk full?): {_short(fault)}"
         raise DatasetError(message) from None
+
+
+def flush(path: Path) -> None:
+    """Make sure that a file survives a loss of power."""
+    with path.open("rb+") as stream:
+        os.fsync(stream.fileno())
+
+
+def row_blocks(dataset: xr.Dataset, rows: int = BLOCK_ROWS) -> Iterator[xr.Dataset]:
+    """Cut a dataset into blocks of consecutive rows, loaded one at a time."""
+    for begin in range(0, max(dataset.sizes.get("sample", 0), 1), rows):
+        part = dataset
+        if "sample" in dataset.sizes:
+            part = dataset.isel(sample=slice(begin, begin + rows))
+        with _LOCK:
+            loaded: xr.Dataset = part.load()
+        yield loaded
 
 
 def read_file(path: Path) -> xr.Dataset:
@@ -57,14 +127,57 @@ def read_file(path: Path) -> xr.Dataset:
     DatasetError
         One line: missing, a folder, empty, not netCDF, truncated.
     """
-    _require_netcdf(path)
-    try:
-        with _LOCK, xr.open_dataset(path, engine="netcdf4", decode_times=False) as dataset:
-            loaded: xr.Dataset = dataset.load()
-    except (OSError, RuntimeError, ValueError, KeyError) as fault:
-        message = f"{path}: is truncated or damaged: {_short(fault)}"
-        raise DatasetError(message) from None
+    with reading(path) as dataset:
+        loaded: xr.Dataset = dataset.load()
     return loaded
+
+
+@contextmanager
+def reading(path: Path) -> Iterator[xr.Dataset]:
+    """Open a netCDF file of any kind without reading its values; they are read when asked for.
+
+    Nothing that was read is kept: a column costs its own memory only while the caller holds it.
+
+    Raises
+    ------
+    DatasetError
+        As `read_file`, also for values that cannot be read later on.
+    """
+    import netCDF4
+
+    _require_netcdf(path)
+    with _LOCK:
+        try:
+            file = netCDF4.Dataset(path)
+        except (OSError, RuntimeError) as fault:
+            raise _damaged(path, fault) from None
+        with file:
+            for variable in file.variables.values():
+                with suppress(RuntimeError):  # only chunked ones have a cache, of 64 MB each
+                    variable.set_var_chunk_cache(0, 1, 0.0)
+            try:
+                store = xr.backends.NetCDF4DataStore(file)
+                dataset = xr.open_dataset(store, decode_times=False, cache=False)
+            except (OSError, RuntimeError, ValueError, KeyError) as fault:
+                raise _damaged(path, fault) from None
+            try:
+                yield dataset
+            except (OSError, RuntimeError) as fault:  # of HDF5, when values are asked for
+                raise _damaged(path, fault) from None
+
+
+@contextmanager
+def reading_dataset(path: Path) -> Iterator[xr.Dataset]:
+    """Open a near-field dataset without reading its values; see `reading`.
+
+    Raises
+    ------
+    DatasetError
+        As `read_file`, or the file is of another kind or a newer format.
+    """
+    with reading(path) as dataset:
+        _require_format(dataset, path)
+        yield dataset
 
 
 def open_dataset(path: Path) -> xr.Dataset:
@@ -75,17 +188,9 @@ def open_dataset(path: Path) -> xr.Dataset:
     DatasetError
         As `read_file`, or the file is of another kind or a newer format.
     """
-    dataset = read_file(path)
-    kind = dataset.attrs.get("schema")
-    if kind != SCHEMA:
-        what = f"is a '{kind}'" if kind else "is netCDF, but not written by castblast"
-        message = f"{path}: {what}; a {SCHEMA} is needed"
-        raise DatasetError(message)
-    version = str(dataset.attrs.get("schema_version", ""))
-    if version.split(".")[0] != SCHEMA_VERSION.split(".")[0]:
-        message = f"{path}: has format {version}; this castblast reads {SCHEMA_VERSION}"
-        raise DatasetError(message)
-    return dataset
+    with reading_dataset(path) as dataset:
+        loaded: xr.Dataset = dataset.load()
+    return loaded
 
 
 def require_writable(folder: Path) -> None:
@@ -106,6 +211,40 @@ def require_writable(folder: Path) -> None:
         raise DatasetError(message) from None
 
 
+def _define(file: Any, form: xr.Dataset, rows: int) -> None:
+    """Create dimensions and variables; a fill value only where something may be missing."""
+    for name, size in form.sizes.items():
+        file.createDimension(name, rows if name == "sample" else size)
+    for key, variable in form.variables.items():
+        holes = variable.dtype.kind == "f" and variable.attrs.get("role") in _HOLES
+        settings: dict[str, Any] = {}
+        if "sample" in variable.dims and rows:
+            chunk = (min(rows, CHUNK_ROWS), *variable.shape[1:])
+            settings = {"zlib": True, "complevel": 4, "shuffle": True, "chunksizes": chunk}
+        created = file.createVariable(
+            key,
+            str if variable.dtype.kind in "OUT" else variable.dtype,
+            variable.dims,
+            fill_value=float("nan") if holes else None,
+            **settings,
+        )
+        if settings:  # whole chunks go straight to the file: no cache is needed
+            created.set_var_chunk_cache(0, 1, 0.0)
+        created.setncatts(variable.attrs)
+
+
+def _require_format(dataset: xr.Dataset, path: Path) -> None:
+    kind = dataset.attrs.get("schema")
+    if kind != SCHEMA:
+        what = f"is a '{kind}'" if kind else "is netCDF, but not written by castblast"
+        message = f"{path}: {what}; a {SCHEMA} is needed"
+        raise DatasetError(message)
+    version = str(dataset.attrs.get("schema_version", ""))
+    if version.split(".")[0] != SCHEMA_VERSION.split(".")[0]:
+        message = f"{path}: has format {version}; this castblast reads {SCHEMA_VERSION}"
+        raise DatasetError(message)
+
+
 def _require_netcdf(path: Path) -> None:
     """Tell the common mistakes apart before the library sees the file."""
     try:
@@ -123,21 +262,8 @@ def _require_netcdf(path: Path) -> None:
         raise DatasetError(f"{path}: is not a netCDF file")
 
 
-def _encoding(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
-    """Compression for everything with samples; no fill value where nothing may be missing."""
-    encoding: dict[str, dict[str, Any]] = {}
-    for name, variable in dataset.variables.items():
-        settings: dict[str, Any] = {"_FillValue": None}
-        if variable.dtype.kind == "f" and variable.attrs.get("role") in (
-            "target",
-            "diagnostic",
-            "history",
-        ):
-            settings["_FillValue"] = float("nan")
-        if "sample" in variable.dims:
-            settings |= {"zlib": True, "complevel": 4, "shuffle": True}
-        encoding[str(name)] = settings
-    return encoding
+def _damaged(path: Path, fault: BaseException) -> DatasetError:
+    return DatasetError(f"{path}: is truncated or damaged: {_short(fault)}")
 
 
 def _short(fault: BaseException) -> str:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from castblast.dataset.provenance import differences
-from castblast.dataset.store import read_file, require_writable
+from castblast.dataset.store import reading, require_writable
 from castblast.errors import DatasetError, SpecError, StaleResultError
 from castblast.files import write_text
 
@@ -40,12 +40,13 @@ def is_finished(path: Path, origin: Mapping[str, Any]) -> bool:
     if not path.exists():
         return False
     try:
-        found = read_file(path)
+        with reading(path) as found:
+            attributes = dict(found.attrs)
     except DatasetError:
         path.replace(path.with_suffix(".nc.cut"))
         return False
     try:
-        old = json.loads(found.attrs["made_from"])
+        old = json.loads(attributes["made_from"])
     except (KeyError, ValueError):
         message = f"{path}: is not a dataset of castblast; choose another name with --out"
         raise SpecError(message) from None
@@ -71,6 +72,8 @@ def open_work_folder(path: Path, origin: Mapping[str, Any], *, restart: bool) ->
     old = _read_note(folder / _NOTE)
     if old and old != origin:
         raise StaleResultError(_stale(folder, old, origin))
+    for left_over in folder.glob(".*.tmp.*"):  # of a process that was killed while it wrote
+        left_over.unlink(missing_ok=True)
     write_text(folder / _NOTE, json.dumps(dict(origin), indent=1, sort_keys=True) + "\n")
     return folder
 

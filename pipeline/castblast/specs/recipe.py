@@ -27,6 +27,8 @@ DESIGN_NAMES = tuple(v.name for v in INPUTS if v.role != "solver")
 SPLIT_NAMES = ("train", "valid", "calibration", "test")
 #: Keys that describe a dataset without changing one number of it.
 DESCRIPTIVE_KEYS = ("title", "summary", "license", "creator", "max_failed_share")
+#: Keys that say how a dataset is made, without changing one number of it either.
+EXECUTION_KEYS = ("shard_size",)
 
 Distribution = Literal["uniform", "log_uniform"]
 
@@ -253,7 +255,8 @@ class Recipe(Spec):
     max_failed_share : float
         A build with a larger share of failed samples is refused.
     shard_size : int
-        Rows that one task simulates and writes.
+        Rows that one task simulates and writes; changes no number. A shard should last a second or
+        so, and there should be many per worker, so that all end at nearly the same time.
     """
 
     name: str
@@ -271,7 +274,7 @@ class Recipe(Spec):
     burden_parameter_set: Literal["authors", "field"] = "authors"
     split: SplitShares = SplitShares()
     max_failed_share: float = Field(default=0.01, ge=0.0, le=1.0)
-    shard_size: int = Field(default=50, ge=1)
+    shard_size: int = Field(default=500, ge=1, le=1_000_000)
 
     @field_validator("name")
     @classmethod

@@ -7,18 +7,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from castblast.dataset.assemble import assemble
 from castblast.dataset.build import build_shards
 from castblast.dataset.card import write_card
-from castblast.dataset.check import check
 from castblast.dataset.design import make_design
 from castblast.dataset.failures import require_success, summary
+from castblast.dataset.final import Rows, write_final
+from castblast.dataset.meter import peak_memory
 from castblast.dataset.provenance import ExplosiveSource, load_explosives, made_from, rows_hash
-from castblast.dataset.shards import join_shards, make_tasks
 from castblast.dataset.simulation import Simulator, blast_simulator
-from castblast.dataset.store import open_dataset, require_writable, write_dataset
+from castblast.dataset.store import reading_dataset, require_writable
+from castblast.dataset.work import Work
 from castblast.dataset.workplace import close_work_folder, is_finished, open_work_folder
-from castblast.errors import CheckError
 from castblast.progress import ProgressCallback, silent
 from castblast.specs.recipe import RecipeSource, load_recipe
 
@@ -118,27 +117,28 @@ def produce(
     if not restart and is_finished(path, origin):
         line = f"{path}: finished already, from the same recipe"
         return GenerateOutcome(path, (line,), _document(path))
+    progress(0.0, "drawing the design")
     design = make_design(recipe, simulator, str(source.path))
-    folder = open_work_folder(path, origin, restart=restart)
-    tasks = make_tasks(design, simulator, rows_hash(origin), folder.resolve(), recipe.shard_size)
-    lines = build_shards(tasks, workers=workers, scheduler=scheduler, progress=progress)
-    progress(1.0, "writing the dataset")
-    results = join_shards(tasks)
-    require_success(recipe, tuple(entry.name for entry in explosives), design, results.status)
-    dataset = assemble(source, explosives, design, results)
-    faults = check(dataset)
-    if faults:  # a fault of the physics or ours: better no dataset than a wrong one
-        message = f"{path}: not written, as it does not pass its own check:\n"
-        raise CheckError(message + "\n".join(f"  {fault}" for fault in faults))
-    write_dataset(dataset, path)
-    card = write_card(dataset, path.with_name(CARD_NAME))
+    folder = open_work_folder(path, origin, restart=restart).resolve()
+    work = Work(design, simulator, rows_hash(origin), folder, recipe.shard_size)
+    lines = build_shards(work, workers=workers, scheduler=scheduler, progress=progress)
+    names = tuple(entry.name for entry in explosives)
+    require_success(recipe, names, design, work.status)
+    rows = Rows(design, work.status, work.results())
+    content = write_final(path, folder, source, explosives, rows, progress=progress)
+    return finish(path, content, [*lines, summary(work.status)])
+
+
+def finish(path: Path, content: str, lines: list[str]) -> GenerateOutcome:
+    """Describe a dataset that lies in its place, and remove its shards."""
+    with reading_dataset(path) as dataset:
+        card = write_card(dataset, path.with_name(CARD_NAME))
     close_work_folder(path)
-    lines += [
-        summary(results.status),
-        f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB, content "
-        f"{dataset.attrs['content_sha256'][:12]}) and {card.name}",
-    ]
-    return GenerateOutcome(path, tuple(lines), _document(path))
+    wrote = (
+        f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB, content {content[:12]}) and "
+        f"{card.name}; peak {peak_memory() / 1e6:.0f} MB"
+    )
+    return GenerateOutcome(path, (*lines, wrote), _document(path))
 
 
 def _output_path(source: RecipeSource, out: Path | None) -> Path:
@@ -148,7 +148,8 @@ def _output_path(source: RecipeSource, out: Path | None) -> Path:
 
 
 def _document(path: Path) -> dict[str, Any]:
-    attributes = open_dataset(path).attrs
+    with reading_dataset(path) as dataset:
+        attributes = dict(dataset.attrs)
     keys = ("id", "n_ok", "n_failed", "designs_drawn", "recipe_sha256", "content_sha256")
     return {"path": str(path), **{key: _plain(attributes[key]) for key in keys}}
 
