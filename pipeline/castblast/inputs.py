@@ -114,6 +114,7 @@ def resolve_inputs(
     return {name: float(column[0]) for name, column in full.items()}
 
 
+@np.errstate(over="ignore", invalid="ignore")  # what is infinite is refused by its bounds
 def design_fault_columns(values: InputColumns, count: int) -> list[FaultyRows]:
     """Find what makes designs impossible.
 

@@ -1,5 +1,7 @@
 """Designs: the Latin-hypercube property, rules by resampling, splits and explosives in balance."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from fake_blast import fake_simulator, write_recipe
@@ -7,6 +9,8 @@ from fake_blast import fake_simulator, write_recipe
 from castblast.dataset.design import draw_batch, make_design, split_labels
 from castblast.errors import SpecError
 from castblast.specs.recipe import load_recipe
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def design_of(tmp_path, **changes):
@@ -114,6 +118,24 @@ def test_seed_decides_everything(tmp_path):
     assert not np.array_equal(one.split, other.split)
 
 
+def test_shipped_designs_stay_what_they_were():
+    """Published figures rest on these rows; counts exact, values but for the last bit of exp."""
+    drawn = {}
+    for name, row in (
+        ("quickstart", (134320216.58534864, 10.400830081964651, 2.0125847408470144e-05)),
+        ("full", (53744969.28978618, 7.588940083797139, 5.6917675863026905e-05)),
+    ):
+        path = ROOT / "data_specs" / "recipes" / f"{name}.yaml"
+        design = make_design(load_recipe(path).recipe, fake_simulator(path), str(path))
+        first = tuple(design.inputs[k][0] for k in ("ucs", "burden", "rise_time"))
+        assert first == pytest.approx(row, rel=1e-14)
+        drawn[name] = (design.drawn, np.bincount(design.batch).tolist())
+    assert drawn == {
+        "quickstart": (2611, [1525, 365, 91, 15, 2, 1, 1]),
+        "full": (11057, [9037, 877, 78, 8]),
+    }
+
+
 def test_split_does_not_depend_on_the_variables(tmp_path):
     _, one = design_of(tmp_path)
     _, other = design_of(tmp_path, variables=ROOMY)
@@ -144,6 +166,29 @@ def test_impossible_ranges_stop_before_any_run_and_name_the_rule(tmp_path):
     assert "100.0% of the designs" in message
     assert "stemming_length below 0.4 burden" in message
     assert "r.yaml" in message
+
+
+@pytest.mark.parametrize(("least", "share"), [(0.5, None), (1.0, r"71\.[46]% of the designs")])
+def test_most_designs_must_be_possible(tmp_path, least, share):
+    """Burden B in [1, 15] m, 5 m of stemming and a rule B <= 5 m / k: (15 - 5 / k) / 14 break it.
+
+    A third of the designs with k = 0.5, which is drawn anew; ten in fourteen with k = 1, which is
+    refused. The share is exact to one of the 500 strata of the trial.
+    """
+    variables = {
+        "burden": {"lower": "1 m", "upper": "15 m"},
+        "bench_height": "10 m",
+        "charge_length": "5 m",
+    }
+    changes = {"variables": variables, "constraints": {"minimum_stemming_ratio": least}}
+    if share is None:
+        _, design = design_of(tmp_path, size=1000, **changes)
+        assert design.columns["burden"].max() <= 10.0
+        assert 1000 / design.drawn == pytest.approx(9 / 14, abs=0.005)
+        return
+    with pytest.raises(SpecError, match=share) as caught:
+        design_of(tmp_path, **changes)
+    assert f"stemming_length below {least:g} burden" in str(caught.value)
 
 
 def test_no_room_for_a_charge_names_the_physics(tmp_path):

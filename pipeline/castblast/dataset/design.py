@@ -88,9 +88,9 @@ def extend_design(
 ) -> Design:
     """Draw more rows for a recipe that has rows already.
 
-    The new rows are Latin hypercubes of their own: each half of the whole is spread evenly. Old
-    rows keep everything, their split included; the new ones are dealt to the splits by the shares
-    of the recipe.
+    The new rows are Latin hypercubes of their own, so old and new rows are spread evenly each.
+    Old rows keep everything, their split included; the new ones are dealt to the splits by the
+    shares of the recipe.
 
     Parameters
     ----------
