@@ -77,7 +77,7 @@ def resolve_columns(
     -------
     dict of (n,)
         Every name of `variables.INPUTS`, in that order. `outer_radius` and `zones` are 0 where
-        the near field is to choose. Read-only views where that saves a copy.
+        the near field is to choose. For reading only: constants and given columns are no copies.
 
     Raises
     ------
@@ -179,10 +179,11 @@ def design_faults(values: Mapping[str, float]) -> list[str]:
 
 def _columns(values: InputColumns, count: int) -> dict[str, FloatArray]:
     """Give every value the length of a column, without a copy."""
-    return {
-        name: np.broadcast_to(np.asarray(value, dtype=np.float64), (count,))
-        for name, value in values.items()
-    }
+    columns = {}
+    for name, value in values.items():
+        column = np.asarray(value, dtype=np.float64)
+        columns[name] = column if column.shape == (count,) else np.broadcast_to(column, (count,))
+    return columns
 
 
 def _fill_design(given: Mapping[str, FloatArray], count: int) -> dict[str, FloatArray]:
