@@ -19,7 +19,8 @@ def check(screen: Screen, dataset: _Dataset) -> Mapping[str, Any]:
     """Check a dataset against the format and report all faults (exit code 4 if there are any)."""
     from castblast.stages.dataset import check_dataset
 
-    faults = check_dataset(dataset)
+    with screen.progress("check") as progress:
+        faults = check_dataset(dataset, progress)
     for fault in faults:
         screen.say(f"{dataset}: {fault}")
     if faults:

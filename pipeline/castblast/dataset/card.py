@@ -10,10 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from castblast.dataset.failures import summary
-from castblast.dataset.schema import flag_names, names_with_role
+from castblast.dataset.schema import flag_counts, flag_rows, names_with_role
 from castblast.errors import Status
 from castblast.files import write_text
 from castblast.variables import VARIABLES
@@ -45,7 +44,8 @@ def training_statistics(dataset: xr.Dataset, name: str) -> dict[str, float]:
         NaN where there are no such rows.
     """
     values = np.broadcast_to(dataset[name].to_numpy(), dataset.sizes["sample"])
-    rows = values[_training_rows(dataset)]
+    ok = dataset["status"].to_numpy() == Status.OK
+    rows = values[ok & flag_rows(dataset["split"], "train")]
     if not len(rows):
         return dict.fromkeys(("mean", "std", "min", "max"), float("nan"))
     return {
@@ -82,7 +82,6 @@ def _motivation(dataset: xr.Dataset) -> str:
 
 
 def _composition(dataset: xr.Dataset) -> str:
-    explosives, splits = (flag_names(dataset[name]) for name in ("explosive", "split"))
     inputs = [
         (*_named(name), _sampling(dataset, name)) for name in names_with_role(dataset, "input")
     ]
@@ -98,7 +97,7 @@ def _composition(dataset: xr.Dataset) -> str:
     return "\n\n".join(
         (
             summary(dataset["status"].to_numpy()) + ". A failed sample keeps its row.",
-            f"Splits: {_counts(splits)}. Explosives: {_counts(explosives)}.",
+            f"Splits: {_counts(dataset['split'])}. Explosives: {_counts(dataset['explosive'])}.",
             _table(("input", "unit", "sampled"), inputs),
             f"The same in every sample: {fixed}." if fixed else "",
             "Outputs over the finished training samples:",
@@ -140,15 +139,8 @@ def _shown_statistics(dataset: xr.Dataset, name: str) -> tuple[str, ...]:
     return tuple(f"{v * factor:.4g}" for v in training_statistics(dataset, name).values())
 
 
-def _training_rows(dataset: xr.Dataset) -> NDArray[np.bool_]:
-    ok = dataset["status"].to_numpy() == Status.OK
-    return np.asarray(ok & (flag_names(dataset["split"]) == "train"))
-
-
-def _counts(names: NDArray[np.str_]) -> str:
-    """Count equal names, in the order of their first appearance in the alphabet."""
-    found, counts = np.unique(names, return_counts=True)
-    return ", ".join(f"{name} {count}" for name, count in zip(found, counts, strict=True))
+def _counts(variable: xr.DataArray) -> str:
+    return ", ".join(f"{name} {count}" for name, count in flag_counts(variable).items())
 
 
 def _table(header: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:

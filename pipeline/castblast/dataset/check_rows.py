@@ -107,9 +107,9 @@ class RowCheck:
         beyond = (values < low - 1e-9 * abs(low)) | (values > high + 1e-9 * abs(high))
         what = f"implausible; allowed: {low:g} to {high:g} {VARIABLES[name].unit}"
         self._note(block, name, what, ok & finite & beyond, values)
-        low, high = variable.attrs.get("sampled_lower"), variable.attrs.get("sampled_upper")
-        if low is not None and high is not None and "sampled_as_ratio_of" not in variable.attrs:
-            outside = (values < low) | (values > high)
+        bounds = [variable.attrs.get(f"sampled_{end}") for end in ("lower", "upper")]
+        if None not in bounds and "sampled_as_ratio_of" not in variable.attrs:
+            outside = (values < bounds[0]) | (values > bounds[1])
             self._note(block, name, "outside the sampled range", outside, values)
 
     def _note(

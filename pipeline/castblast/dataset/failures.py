@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,8 +15,11 @@ _SHOWN = 5
 
 def causes(status: NDArray[np.integer]) -> list[tuple[Status, int]]:
     """Failures by cause, the most frequent first; equally frequent ones by code."""
-    counts = Counter(sorted(status.tolist()))
-    return [(Status(code), n) for code, n in counts.most_common() if code != Status.OK]
+    codes, counts = np.unique(status, return_counts=True)
+    found = [(Status(code), int(n)) for code, n in zip(codes.tolist(), counts, strict=True)]
+    return sorted(
+        ((cause, n) for cause, n in found if cause != Status.OK), key=lambda entry: -entry[1]
+    )
 
 
 def summary(status: NDArray[np.integer]) -> str:
@@ -46,14 +47,14 @@ def require_success(
         return
     found = causes(status)
     lines = [f"  {count} {cause.name.lower()}: {cause.meaning}" for cause, count in found]
-    rank = {cause: number for number, (cause, _) in enumerate(found)}
-    kinds = [Status(int(code)) for code in status]
-    for i in sorted(failed.tolist(), key=lambda i: (rank[kinds[i]], i))[:_SHOWN]:
+    rank = {int(cause): number for number, (cause, _) in enumerate(found)}
+    order = np.argsort([rank[code] for code in status[failed].tolist()], kind="stable")
+    for i in failed[order[:_SHOWN]].tolist():
         shown = ", ".join(
             f"{spec.name} {VARIABLES[spec.name].show(float(design.columns[spec.name][i]))}"
             for spec in recipe.sampled
         )
-        cause = kinds[i].name.lower()
+        cause = Status(int(status[i])).name.lower()
         lines.append(
             f"  sample {design.sample[i]}, {cause}: {explosives[design.explosive[i]]}, {shown}"
         )

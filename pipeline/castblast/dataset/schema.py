@@ -117,6 +117,21 @@ def flag_names(variable: xr.DataArray) -> NDArray[np.str_]:
     return np.asarray(meanings[variable.to_numpy()])
 
 
+def flag_counts(variable: xr.DataArray) -> dict[str, int]:
+    """How often each code of a column was met, by name in alphabetical order."""
+    meanings = str(variable.attrs["flag_meanings"]).split()
+    codes, counts = np.unique(variable.to_numpy(), return_counts=True)
+    return dict(
+        sorted((meanings[code], int(count)) for code, count in zip(codes, counts, strict=True))
+    )
+
+
+def flag_rows(variable: xr.DataArray, name: str) -> NDArray[np.bool_]:
+    """Rows with the code of one name."""
+    meanings = str(variable.attrs["flag_meanings"]).split()
+    return np.asarray(variable.to_numpy() == meanings.index(name))
+
+
 def names_with_role(dataset: xr.Dataset, role: str) -> tuple[str, ...]:
     """Physical variables of one role, in the order of the file."""
     return tuple(

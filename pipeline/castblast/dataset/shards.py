@@ -16,7 +16,7 @@ import time
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -130,13 +130,15 @@ def write_shard(folder: Path, span: Span, rows_sha256: str, result: BatchResult)
     DatasetError
         The folder cannot be written to, or the disk is full.
     """
-    arrays = {"status": np.asarray(result.status, dtype=np.int8), **result.outputs}
+    arrays: dict[str, NDArray[Any]] = {"status": np.asarray(result.status, dtype=np.int8)}
+    arrays |= result.outputs
     arrays |= {name: result.histories[name].astype(np.float32) for name in HISTORY_NAMES}
     seal = _seal(span, rows_sha256, arrays)
     path = folder / span.file_name
 
     def write(name: Path) -> None:
-        np.savez(name, **arrays, **{_ORIGIN: np.array(rows_sha256), _SEAL: np.array(seal)})
+        marks = {_ORIGIN: np.array(rows_sha256), _SEAL: np.array(seal)}
+        np.savez(name, allow_pickle=False, **arrays, **marks)
 
     try:
         return write_with(path, write)
@@ -193,7 +195,7 @@ def find_spans(folder: Path) -> list[Span]:
     return spans
 
 
-def _seal(span: Span, rows_sha256: str, arrays: dict[str, NDArray[np.generic]]) -> str:
+def _seal(span: Span, rows_sha256: str, arrays: dict[str, NDArray[Any]]) -> str:
     digest = hashlib.sha256(f"{rows_sha256} {span.begin} {span.end}".encode())
     for name in sorted(arrays):
         values = np.ascontiguousarray(arrays[name])

@@ -58,9 +58,9 @@ def write_blocks(
             stop = begin + block.sizes.get("sample", 0)
             for key, variable in block.variables.items():
                 if "sample" in variable.dims:
-                    file[key][begin:stop] = variable.to_numpy()
+                    file[str(key)][begin:stop] = variable.to_numpy()
                 elif begin == 0:
-                    file[key][...] = variable.to_numpy()
+                    file[str(key)][...] = variable.to_numpy()
             begin = stop
         if begin != rows or form is None:
             message = f"{name}: {begin} rows came, {rows} were announced"
@@ -156,7 +156,7 @@ def reading(path: Path) -> Iterator[xr.Dataset]:
                 with suppress(RuntimeError):  # only chunked ones have a cache, of 64 MB each
                     variable.set_var_chunk_cache(0, 1, 0.0)
             try:
-                store = xr.backends.NetCDF4DataStore(file)
+                store: Any = xr.backends.NetCDF4DataStore(file)  # type: ignore[no-untyped-call]
                 dataset = xr.open_dataset(store, decode_times=False, cache=False)
             except (OSError, RuntimeError, ValueError, KeyError) as fault:
                 raise _damaged(path, fault) from None

@@ -14,11 +14,12 @@ from castblast.dataset.card import training_statistics
 from castblast.dataset.check import check
 from castblast.dataset.failures import summary
 from castblast.dataset.provenance import SOURCES, explosive_from_text
-from castblast.dataset.schema import flag_names, names_with_role
+from castblast.dataset.schema import flag_counts, flag_names, names_with_role
 from castblast.dataset.simulation import blast_simulator
-from castblast.dataset.store import open_dataset
+from castblast.dataset.store import reading_dataset
 from castblast.errors import SpecError, Status
 from castblast.kernel import source_hash
+from castblast.progress import ProgressCallback, silent
 from castblast.specs.recipe import recipe_from_text
 from castblast.variables import INPUT_NAMES, OUTPUT_NAMES, VARIABLES
 
@@ -46,7 +47,7 @@ class Reproduction:
     document: dict[str, Any]
 
 
-def check_dataset(path: Path) -> list[str]:
+def check_dataset(path: Path, progress: ProgressCallback = silent) -> list[str]:
     """Report every departure of a file from the format; empty if there is none.
 
     Raises
@@ -54,7 +55,8 @@ def check_dataset(path: Path) -> list[str]:
     DatasetError
         The file cannot be read as a dataset at all.
     """
-    return [str(fault) for fault in check(open_dataset(path))]
+    with reading_dataset(path) as dataset:
+        return [str(fault) for fault in check(dataset, progress)]
 
 
 def describe_dataset(path: Path) -> Description:
@@ -65,12 +67,13 @@ def describe_dataset(path: Path) -> Description:
     DatasetError
         The file cannot be read as a dataset.
     """
-    dataset = open_dataset(path)
+    with reading_dataset(path) as dataset:
+        return _describe(dataset, path)
+
+
+def _describe(dataset: xr.Dataset, path: Path) -> Description:
     attributes = dataset.attrs
-    counts = {
-        name: dict(zip(*_unique(flag_names(dataset[name])), strict=True))
-        for name in ("explosive", "split", "status")
-    }
+    counts = {name: flag_counts(dataset[name]) for name in ("explosive", "split", "status")}
     variables = {
         name: {"role": role, "units": VARIABLES[name].unit, **training_statistics(dataset, name)}
         for role in ("input", "derived", "fixed", "target", "diagnostic")
@@ -127,12 +130,13 @@ def reproduce_sample(path: Path, sample: int) -> Reproduction:
     SpecError
         No such sample, or a recipe that this version cannot read.
     """
-    dataset = open_dataset(path)
-    position = _position(dataset, sample, path)
-    stored = dataset.isel(sample=position)
-    recipe = recipe_from_text(dataset.attrs["recipe"], f"{path}: recipe")
-    texts = json.loads(dataset.attrs["explosive_specs"])
-    name = str(flag_names(dataset["explosive"])[position])
+    with reading_dataset(path) as dataset:
+        position = _position(dataset, sample, path)
+        wanted = ["explosive", "status", *INPUT_NAMES, *OUTPUT_NAMES]
+        stored = dataset[wanted].isel(sample=position).load()
+    recipe = recipe_from_text(stored.attrs["recipe"], f"{path}: recipe")
+    texts = json.loads(stored.attrs["explosive_specs"])
+    name = str(flag_names(stored["explosive"]))
     explosive = explosive_from_text(texts[name], f"{path}: {name}").spec.to_explosive()
     inputs = {key: np.array([float(stored[key])]) for key in INPUT_NAMES}
     result = blast_simulator(recipe, (explosive,)).run(inputs, np.zeros(1, dtype=np.int8))
@@ -142,7 +146,7 @@ def reproduce_sample(path: Path, sample: int) -> Reproduction:
     statuses = (Status(int(stored["status"])), Status(int(result.status[0])))
     same = statuses[0] == statuses[1] and deviations[worst] <= SAME
     verdict = f"sample {sample}: " + _verdict(same, statuses, worst, deviations[worst])
-    if not same and dataset.attrs["source_sha256"] != source_hash(SOURCES):
+    if not same and stored.attrs["source_sha256"] != source_hash(SOURCES):
         verdict += "; the code of the physics is not the one that made the file"
     rows = tuple(
         (key, *(VARIABLES[key].show(value) for value in values[key]), f"{deviations[key]:.1e}")
@@ -190,8 +194,3 @@ def _verdict(same: bool, statuses: tuple[Status, Status], worst: str, deviation:
         exactly = "bit for bit" if deviation == 0.0 else f"to {deviation:.1e} relative"
         return f"reproduced {exactly}"
     return f"differs, most in {worst} ({deviation:.1e} relative)"
-
-
-def _unique(names: np.ndarray[Any, np.dtype[np.str_]]) -> tuple[list[str], list[int]]:
-    found, counts = np.unique(names, return_counts=True)
-    return found.tolist(), counts.tolist()
