@@ -86,8 +86,21 @@ def lean_kernel(function: Callable[_P, _R]) -> Callable[_P, _R]:
     return _compile(function, parallel=False, lean=True)
 
 
+def fused_kernel(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Compile as `inline_kernel`, merged into its callers before they are optimised.
+
+    A loop whose body calls a function that was optimised by itself does not become vector code.
+    """
+    return _compile(function, parallel=False, lean=True, inline=True, fused=True)
+
+
 def _compile(
-    function: Callable[_P, _R], *, parallel: bool, lean: bool = False, inline: bool = False
+    function: Callable[_P, _R],
+    *,
+    parallel: bool,
+    lean: bool = False,
+    inline: bool = False,
+    fused: bool = False,
 ) -> Callable[_P, _R]:
     folder = _prepare_cache()
     import numba
@@ -100,6 +113,7 @@ def _compile(
         "error_model": "numpy",
         "parallel": parallel,
         "forceinline": inline,
+        "inline": "always" if fused else "never",
         "_nrt": not lean,
     }
     return cast("Callable[_P, _R]", numba.njit(**options)(function))

@@ -14,7 +14,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from castblast.kernel import kernel
+from castblast.kernel import inline_kernel, kernel
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
@@ -25,6 +25,8 @@ _WEIGHTS = tuple(float(w) for w in 0.5 * _weights)
 
 #: A tabulated isentrope may be continued by at most this factor beyond its ends.
 TABLE_MARGIN = 3.0
+#: Exponent beyond which a term of the JWL law has vanished.
+_FAR = 600.0
 
 
 class ProductIsentrope(NamedTuple):
@@ -168,16 +170,20 @@ def _interval_work(isentrope: ProductIsentrope, i: int, x0: float, x1: float) ->
     return work * (x1 - x0)
 
 
+@inline_kernel
+def jwl_pressure(
+    a: float, b: float, c: float, r1: float, r2: float, omega: float, volume: float
+) -> float:
+    """JWL pressure [Pa] at a relative volume > 0; `a`, `b`, `c` in Pa."""
+    return a * np.exp(-r1 * volume) + b * np.exp(-r2 * volume) + c * volume ** (-1.0 - omega)
+
+
 @kernel
 def pressure(isentrope: ProductIsentrope, relative_volume: float) -> float:
     """Pressure on the isentrope [Pa] at a relative volume > 0; the table's end slopes continue."""
     if not isentrope.tabulated:
-        v = relative_volume
-        return float(
-            isentrope.a * np.exp(-isentrope.r1 * v)
-            + isentrope.b * np.exp(-isentrope.r2 * v)
-            + isentrope.c * v ** (-1.0 - isentrope.omega)
-        )
+        i = isentrope
+        return jwl_pressure(i.a, i.b, i.c, i.r1, i.r2, i.omega, relative_volume)
     x = np.log(relative_volume)
     last = isentrope.log_volume.size - 1
     if x <= isentrope.log_volume[0]:
@@ -239,7 +245,7 @@ def _end_work(isentrope: ProductIsentrope, i: int, x: float) -> float:
     return float(scale * np.expm1(work_exponent * (x - isentrope.log_volume[i])) / work_exponent)
 
 
-@kernel
+@inline_kernel
 def gas_state(isentrope: ProductIsentrope, relative_volume: float) -> tuple[float, float, float]:
     """Pressure [Pa], exponent k [-] and energy [J m-3] at a relative volume > 0, at one go.
 
@@ -252,8 +258,9 @@ def gas_state(isentrope: ProductIsentrope, relative_volume: float) -> tuple[floa
             energy(isentrope, relative_volume),
         )
     v = relative_volume
-    first = isentrope.a * np.exp(-isentrope.r1 * v)
-    second = isentrope.b * np.exp(-isentrope.r2 * v)
+    # Results that underflow take the slow way through the mathematical library.
+    first = isentrope.a * np.exp(-min(isentrope.r1 * v, _FAR))
+    second = isentrope.b * np.exp(-min(isentrope.r2 * v, _FAR))
     tail = isentrope.c * np.exp(-isentrope.omega * np.log(v))
     p = first + second + tail / v
     stiffness = v * (isentrope.r1 * first + isentrope.r2 * second) + (1.0 + isentrope.omega) * (

@@ -40,24 +40,27 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.kernel import kernel
-from castblast.nearfield.mohr_coulomb import YieldModel, return_to_yield
+from castblast.kernel import fused_kernel, inline_kernel, kernel
+from castblast.nearfield.mohr_coulomb import YieldModel, edge_return
+from castblast.nearfield.zone import (
+    Flow,
+    Stress,
+    deform,
+    edge_flow,
+    elastic,
+    extent,
+    hoop_compressive,
+    resist,
+    try_one_plane,
+    viscous_work,
+)
 
 FloatArray: TypeAlias = NDArray[np.float64]
-IntArray: TypeAlias = NDArray[np.int64]
-
-# Bits of `Body.history`: what has happened in a zone.
-SHEAR_YIELD = 1
-TENSILE_YIELD = 2
-CRUSHED_UNDER_HOOP_COMPRESSION = 4
 
 # Slots of the work ledger, per radian.
 SHEAR, TENSION, VISCOUS, BOUNDARY, LOAD, RAMP = 0, 1, 2, 3, 4, 5
 LEDGER_SIZE = 6
 
-
-#: The linear viscosity acts over at least this share of the radius, on however fine a mesh.
-VISCOUS_LENGTH = 0.04
 #: Largest strain of a zone in one step; the work of a step is right to its square.
 STRAIN_STEP = 0.01
 
@@ -91,28 +94,32 @@ class Body(NamedTuple):
 
     Attributes
     ----------
-    initial_radius, mass, radius, velocity, force : array (n + 1,) [m, kg, m, m/s, N; per radian]
-    initial_area, width, mean_radius : array (n,) [m2, m, m]
+    initial_radius, mass, per_mass : array (n + 1,) [m, kg, 1/kg; per radian]
+    radius, velocity, force : array (n + 1,) [m, m/s, N; per radian]
+    initial_area, per_initial_area : array (n,) [m2, m-2]
+    width, mean_radius : array (n,) [m]
     radial, hoop, axial : array (n,) [Pa]
         Kirchhoff stress, tension positive.
     viscous : array (n,) [Pa]
         Viscous pressure of the last step.
     tension : array (n,) [Pa]
         Present tensile strength.
-    shear_multiplier : array (n,) [-]
-        Sum of the plastic shear multiplier of the most compressive direction.
+    shear_multiplier, tensile_multiplier, hoop_multiplier : array (n,) [-]
+        Sum of the plastic multiplier of the most compressive direction, of that of tension, and
+        of the first one while the hoop stress was compressive; where a zone has never yielded so,
+        minus the strain by which it fell short of it (see `castblast.nearfield.zone.extent`).
     shear_strain : array (n,) [-]
         Integral of sqrt(2/3 de:de) of plastic shear flow.
-    history : int array (n,)
-        Bits of what has happened.
     """
 
     initial_radius: FloatArray
     mass: FloatArray
+    per_mass: FloatArray
     radius: FloatArray
     velocity: FloatArray
     force: FloatArray
     initial_area: FloatArray
+    per_initial_area: FloatArray
     width: FloatArray
     mean_radius: FloatArray
     radial: FloatArray
@@ -121,8 +128,9 @@ class Body(NamedTuple):
     viscous: FloatArray
     tension: FloatArray
     shear_multiplier: FloatArray
+    tensile_multiplier: FloatArray
+    hoop_multiplier: FloatArray
     shear_strain: FloatArray
-    history: IntArray
 
 
 @kernel
@@ -161,7 +169,9 @@ def graded_radii(inner: float, outer: float, zones: int, first: float) -> FloatA
 
 
 @kernel
-def make_body(nodes: FloatArray, material: Material, in_situ_stress: float) -> Body:
+def make_body(
+    nodes: FloatArray, material: Material, model: YieldModel, in_situ_stress: float
+) -> Body:
     """Rock at rest under an isotropic in-situ compression [Pa] on the given node radii [m]."""
     n = nodes.size - 1
     width = nodes[1:] - nodes[:-1]
@@ -171,13 +181,19 @@ def make_body(nodes: FloatArray, material: Material, in_situ_stress: float) -> B
     mass[:-1] += 0.5 * material.density * area
     mass[1:] += 0.5 * material.density * area
     stress = np.full(n, -in_situ_stress)
+    planes = model.planes
+    excess = (1.0 - planes.friction) * in_situ_stress - material.ucs
+    never_sheared = np.full(n, min(planes.shear_compliance * excess, 0.0))
+    never_opened = np.full(n, min((-in_situ_stress - material.tension) / planes.stiffness, 0.0))
     return Body(
         nodes.copy(),
         mass,
+        1.0 / mass,
         nodes.copy(),
         np.zeros(n + 1),
         np.zeros(n + 1),
         area,
+        1.0 / area,
         width,
         mean,
         stress.copy(),
@@ -185,24 +201,11 @@ def make_body(nodes: FloatArray, material: Material, in_situ_stress: float) -> B
         stress.copy(),
         np.zeros(n),
         np.full(n, material.tension),
+        never_sheared,
+        never_opened,
+        never_sheared.copy(),
         np.zeros(n),
-        np.zeros(n),
-        np.zeros(n, dtype=np.int64),
     )
-
-
-@kernel
-def _log_ratio(new: float, old: float) -> float:
-    """ln(new / old) for the small change of one step (error below 1e-11 at 1 percent)."""
-    z = (new - old) / (new + old)
-    z2 = z * z
-    return 2.0 * z * (1.0 + z2 * (1.0 / 3.0 + 0.2 * z2))
-
-
-@kernel
-def _equivalent(radial: float, hoop: float, axial: float) -> float:
-    """Equivalent strain sqrt(2/3 e:e) of principal strains."""
-    return float(np.sqrt(2.0 / 3.0 * (radial * radial + hoop * hoop + axial * axial)))
 
 
 @kernel
@@ -210,9 +213,6 @@ def update_zones(
     body: Body, active: int, dt: float, material: Material, model: YieldModel, work: FloatArray
 ) -> tuple[float, int]:
     """Strain, stress, viscosity and nodal forces of the first `active` zones after a move.
-
-    Plastic work is the mean of old and new stress times the plastic strain: for a quadratic
-    elastic energy this makes elastic plus plastic work equal to the work of the mean stress.
 
     Returns
     -------
@@ -224,87 +224,78 @@ def update_zones(
     # Members of a tuple of arrays are reference-counted at every access: name them once.
     radius, force, widths, means = body.radius, body.force, body.width, body.mean_radius
     radial, hoop, axial, viscous = body.radial, body.hoop, body.axial, body.viscous
-    multiplier, strain = body.shear_multiplier, body.shear_strain
-    areas, tensions, history = body.initial_area, body.tension, body.history
-    lame, shear2 = model.lame, model.twice_shear
-    limit = np.inf
-    fastest = 0.0
+    sheared, opened, crushed = body.shear_multiplier, body.tensile_multiplier, body.hoop_multiplier
+    strain, tensions = body.shear_strain, body.tension
+    areas, per_area = body.initial_area, body.per_initial_area
+    planes = model.planes
     per_second = 1.0 / dt
-    fallbacks = 0
-    force[: active + 1] = 0.0
+    limit, fastest, fallbacks = np.inf, 0.0, 0
+    force[0] = 0.0
     for j in range(active):
-        width = radius[j + 1] - radius[j]
-        mean = 0.5 * (radius[j + 1] + radius[j])
-        if not (width > 0.0 and radius[j] > 0.0):
-            return -1.0, fallbacks
         old_width, old_mean, area = widths[j], means[j], areas[j]
-        radial_strain = _log_ratio(width, old_width)
-        hoop_strain = _log_ratio(mean, old_mean)
-        volume_strain = radial_strain + hoop_strain
-        widths[j], means[j] = width, mean
-        swelling = width * mean / area
-        shrinking = 1.0 / swelling
-        # Elastic trial; the return keeps it where it is admissible.
-        tau_r = radial[j] + lame * volume_strain + shear2 * radial_strain
-        tau_h = hoop[j] + lame * volume_strain + shear2 * hoop_strain
-        tau_a = axial[j] + lame * volume_strain
-        ucs, tension = swelling * material.ucs, swelling * tensions[j]
-        least, most = max(tau_r, tau_h, tau_a), min(tau_r, tau_h, tau_a)
-        if model.friction * least - most > ucs or least > tension:
-            s = return_to_yield(model, tau_r, tau_h, tau_a, ucs, tension)
-            tau_r, tau_h, tau_a = s.radial, s.hoop, s.axial
-            mean_r = 0.5 * area * (radial[j] + tau_r)
-            mean_h = 0.5 * area * (hoop[j] + tau_h)
-            mean_a = 0.5 * area * (axial[j] + tau_a)
-            work[SHEAR] += mean_r * s.shear_radial + mean_h * s.shear_hoop + mean_a * s.shear_axial
-            work[TENSION] += (
-                mean_r * s.tensile_radial + mean_h * s.tensile_hoop + mean_a * s.tensile_axial
-            )
-            multiplier[j] += s.multiplier
-            strain[j] += _equivalent(s.shear_radial, s.shear_hoop, s.shear_axial)
-            if s.multiplier > 0.0:
-                history[j] |= SHEAR_YIELD
-                if s.hoop < -1e-6 * ucs:
-                    history[j] |= CRUSHED_UNDER_HOOP_COMPRESSION
-            if s.tensile_radial + s.tensile_hoop + s.tensile_axial > 0.0:
-                history[j] |= TENSILE_YIELD
-                if material.brittle:
-                    tensions[j] = 0.0
-            if s.fallback:
-                fallbacks += 1
-        radial[j], hoop[j], axial[j] = tau_r, tau_h, tau_a
-        # Tangent of the Kirchhoff law seen by the nodes: radial compression stiffens it.
-        modulus = model.stiffness + abs(tau_r)
-        transit = width * np.sqrt(material.density / modulus)
-        rate = -volume_strain * per_second
-        damping = material.linear_viscosity * max(1.0, VISCOUS_LENGTH * mean / width)
-        if rate > 0.0:
-            damping += material.quadratic_viscosity * transit * rate
-        pressure = modulus * transit * damping * rate * shrinking
-        limit = min(limit, transit * (np.sqrt(1.0 + damping * damping) - damping))
-        fastest = max(fastest, abs(radial_strain), abs(hoop_strain))
-        # Work of q on the exact change of area, split as the two half kicks of the nodes see it.
-        d_width, d_mean = width - old_width, mean - old_mean
-        work[VISCOUS] -= 0.5 * (
-            viscous[j] * (old_mean * d_width + old_width * d_mean)
-            + pressure * (mean * d_width + width * d_mean)
-        )
-        viscous[j] = pressure
-        through = (tau_r * shrinking - pressure) * mean
-        around = 0.5 * (tau_h * shrinking - pressure) * width
-        force[j] += through - around
-        force[j + 1] -= through + around
-    if fastest * limit > STRAIN_STEP * dt:
-        limit = STRAIN_STEP * dt / fastest
-    return limit, fallbacks
+        d = deform(radius[j], radius[j + 1], old_width, old_mean)
+        old = Stress(radial[j], hoop[j], axial[j])
+        trial = elastic(planes, d, old)
+        swelling = d.width * d.mean * per_area[j]
+        one = try_one_plane(planes, trial, old, swelling, material.ucs, tensions[j])
+        flow = one.flow
+        if not one.solved:
+            flow, failed = _edge(model, trial, old, one.ucs, one.tension)
+            fallbacks += failed
+        stress = flow.stress
+        radial[j], hoop[j], axial[j] = stress.radial, stress.hoop, stress.axial
+        widths[j], means[j] = d.width, d.mean
+        sheared[j] = extent(sheared[j], flow.shear, one.shear_shortfall)
+        opened[j] = extent(opened[j], flow.opening, one.tensile_shortfall)
+        if hoop_compressive(stress, one.ucs):
+            crushed[j] = extent(crushed[j], flow.shear, one.shear_shortfall)
+        strain[j] += flow.strain
+        tensions[j] = after_opening(material.brittle, flow.opening, tensions[j])
+        r = resist(
+            d, stress, per_second, planes.stiffness, material.density,
+            material.linear_viscosity, material.quadratic_viscosity, area, radius[j],
+        )  # fmt: skip
+        work[SHEAR] += area * flow.shear_work
+        work[TENSION] += area * flow.tensile_work
+        work[VISCOUS] += viscous_work(d, old_width, old_mean, viscous[j], r.viscous)
+        viscous[j] = r.viscous
+        limit = min(limit, r.limit)
+        fastest = max(fastest, max(abs(d.radial), abs(d.hoop)))  # noqa: PLW3301
+        force[j] += r.through - r.around
+        force[j + 1] = -r.through - r.around
+    return step_limit(limit, fastest, dt), fallbacks
 
 
 @kernel
-def kinetic_energy(body: Body, half_kick: float) -> float:
-    """Kinetic energy per radian [J/m]; `half_kick` [s] brings the velocities to the present."""
+def _edge(
+    model: YieldModel, trial: Stress, old: Stress, ucs: float, tension: float
+) -> tuple[Flow, int]:
+    """Flow of a zone that one plane cannot return, and 1 if no set of planes could."""
+    s = edge_return(model, trial.radial, trial.hoop, trial.axial, ucs, tension)
+    return edge_flow(s, old), 1 if s.fallback else 0
+
+
+@fused_kernel
+def after_opening(brittle: bool, opening: float, tension: float) -> float:
+    """Tensile strength [Pa] left after a step."""
+    return 0.0 if brittle and opening > 0.0 else tension
+
+
+@inline_kernel
+def step_limit(limit: float, fastest: float, dt: float) -> float:
+    """Largest next step [s] from the wave speed and from the largest strain of the last step."""
+    return STRAIN_STEP * dt / fastest if fastest * limit > STRAIN_STEP * dt else limit
+
+
+@kernel
+def kinetic_energy(body: Body, active: int, half_kick: float) -> float:
+    """Kinetic energy per radian [J/m] of the nodes in motion.
+
+    `half_kick` [s] brings their velocities to the present.
+    """
     total = 0.0
-    for i in range(body.mass.size):
-        speed = body.velocity[i] + half_kick * body.force[i] / body.mass[i]
+    for i in range(active):
+        speed = body.velocity[i] + half_kick * body.force[i] * body.per_mass[i]
         total += 0.5 * body.mass[i] * speed * speed
     return total
 

@@ -17,7 +17,16 @@ import numpy as np
 
 from castblast.errors import Status
 from castblast.explosive.isentrope import ProductIsentrope, inside_table, pressure
-from castblast.kernel import kernel
+from castblast.kernel import inline_kernel, kernel
+from castblast.nearfield.clock import (
+    Clock,
+    Schedule,
+    after_step,
+    is_last,
+    last_step,
+    load_work,
+    start_clock,
+)
 from castblast.nearfield.lagrangian import (
     BOUNDARY,
     LEDGER_SIZE,
@@ -30,17 +39,17 @@ from castblast.nearfield.lagrangian import (
     make_body,
     update_zones,
 )
-from castblast.nearfield.mohr_coulomb import make_yield_model
+from castblast.nearfield.mohr_coulomb import YieldModel, make_yield_model
 
-_OK = int(Status.OK)
-_NOT_CONVERGED = int(Status.NOT_CONVERGED)
-_UNSTABLE = int(Status.UNSTABLE_STEP)
-_OUT_OF_TABLE = int(Status.OUT_OF_ISENTROPE)
+OK = int(Status.OK)
+NOT_CONVERGED = int(Status.NOT_CONVERGED)
+UNSTABLE = int(Status.UNSTABLE_STEP)
+OUT_OF_TABLE = int(Status.OUT_OF_ISENTROPE)
 
-#: A step may be at most this much longer than the one before.
-STEP_GROWTH = 1.05
 #: Share of the highest wall speed so far below which rock counts as not yet reached.
-_AT_REST = 1e-9
+AT_REST = 1e-9
+#: Zones in motion at the start.
+FIRST_ZONES = 4
 
 
 class WallLoad(NamedTuple):
@@ -122,6 +131,8 @@ class March(NamedTuple):
     wall_velocity : float [m s-1]
     half_kick : float [s]
         Time by which the velocities of `body` lag behind its positions.
+    active : int
+        Zones that the wave has reached.
     steps, fallbacks : int
     """
 
@@ -132,6 +143,7 @@ class March(NamedTuple):
     reversal_time: float
     wall_velocity: float
     half_kick: float
+    active: int
     steps: int
     fallbacks: int
 
@@ -146,15 +158,6 @@ def full_pressure(load: WallLoad, radius: float) -> float:
 
 
 @kernel
-def wall_pressure(load: WallLoad, time: float, radius: float) -> float:
-    """Wall pressure [Pa] at a time [s] and hole radius [m]."""
-    full = full_pressure(load, radius)
-    if time >= load.rise_time:
-        return full
-    return load.start_pressure + time / load.rise_time * (full - load.start_pressure)
-
-
-@kernel
 def _kick(body: Body, active: int, dt: float, case: Annulus, work: FloatArray) -> None:
     """Advance the velocities by `dt`; the outer node feels its boundary.
 
@@ -162,37 +165,32 @@ def _kick(body: Body, active: int, dt: float, case: Annulus, work: FloatArray) -
     """
     last = case.zones
     for i in range(active):
-        body.velocity[i] += dt * body.force[i] / body.mass[i]
-    if active < last:
-        return
-    radius = body.radius[last]
-    force = body.force[last] - case.in_situ_stress * radius
-    old = body.velocity[last]
+        body.velocity[i] += dt * body.force[i] * body.per_mass[i]
+    if active == last:
+        body.velocity[last], spent = kick_boundary(
+            case, dt, body.radius[last], body.initial_radius[last], body.velocity[last],
+            body.force[last], body.mass[last],
+        )  # fmt: skip
+        work[BOUNDARY] += spent
+
+
+@inline_kernel
+def kick_boundary(
+    case: Annulus, dt: float, radius: float, initial: float, old: float, force: float, mass: float
+) -> tuple[float, float]:
+    """Velocity of the outermost node after a kick, and what it spent on its boundary."""
+    force = force - case.in_situ_stress * radius
     damping = 0.0
     spring = 0.0
     if case.quiet:
         m = case.material
         stiffness = m.bulk_modulus + 4.0 / 3.0 * m.shear_modulus
-        damping = dt * np.sqrt(stiffness * m.density) * radius / body.mass[last]
-        spring = 2.0 * m.shear_modulus * (radius - body.initial_radius[last])
-    new = ((1.0 - 0.5 * damping) * old + dt * (force - spring) / body.mass[last]) / (
-        1.0 + 0.5 * damping
-    )
-    body.velocity[last] = new
+        damping = dt * np.sqrt(stiffness * m.density) * radius / mass
+        spring = 2.0 * m.shear_modulus * (radius - initial)
+    new = ((1.0 - 0.5 * damping) * old + dt * (force - spring) / mass) / (1.0 + 0.5 * damping)
     mean = 0.5 * (old + new)
-    resistance = case.in_situ_stress * radius + spring + damping * body.mass[last] / dt * mean
-    work[BOUNDARY] += resistance * mean * dt
-
-
-@kernel
-def _load_work(
-    load: WallLoad, old_radius: float, new_radius: float, old: float, new: float, work: FloatArray
-) -> None:
-    """Book the work of the wall pressure and what a pressure without rise time would add."""
-    growth = 0.5 * (new_radius * new_radius - old_radius * old_radius)
-    work[LOAD] += 0.5 * (old + new) * growth
-    lost = full_pressure(load, old_radius) - old + full_pressure(load, new_radius) - new
-    work[RAMP] += 0.5 * lost * growth
+    resistance = case.in_situ_stress * radius + spring + damping * mass / dt * mean
+    return new, resistance * mean * dt
 
 
 @kernel
@@ -205,74 +203,84 @@ def _longer(record: FloatArray, used: int) -> FloatArray:
     return longer
 
 
-@kernel
-def march(case: Annulus) -> March:
-    """Run an annulus to its end state.
+@inline_kernel
+def schedule_of(case: Annulus) -> Schedule:
+    """What the clock of a case needs."""
+    load = case.load
+    return Schedule(load.start_pressure, load.rise_time, case.settling_factor, case.courant)
 
-    The wall is taken to have turned back when its velocity, interpolated in time, passes zero
-    after the rise of the load.
-    """
+
+@kernel
+def prepare(case: Annulus) -> tuple[Body, YieldModel, FloatArray, Clock, int]:
+    """Body under the pressure of time zero, yield model, ledger, clock, zones in motion."""
     material, load = case.material, case.load
     nodes = graded_radii(case.inner_radius, case.outer_radius, case.zones, case.first_width)
-    body = make_body(nodes, material, case.in_situ_stress)
     model = make_yield_model(
         material.bulk_modulus, material.shear_modulus, case.friction, case.dilation
     )
+    body = make_body(nodes, material, model, case.in_situ_stress)
     work = np.zeros(LEDGER_SIZE)
-    wave_speed = np.sqrt(model.stiffness / material.density)
+    active = min(FIRST_ZONES, case.zones)
+    transit = body.width[0] / np.sqrt(model.planes.stiffness / material.density)
+    update_zones(body, active, 1e-9 * transit, material, model, work)
+    full = full_pressure(load, body.radius[0])
+    clock = start_clock(schedule_of(case), 1e-2 * case.courant * transit, case.end_time, full)
+    body.force[0] += clock.pressure * body.radius[0]
+    return body, model, work, clock, active
+
+
+@kernel
+def status_after(load: WallLoad, clock: Clock, limit: float, radius: float) -> int:
+    """What a step led to: OK, a zone turned inside out, or gas beyond its isentrope."""
+    if limit <= 0.0 or not np.isfinite(clock.speed):
+        return UNSTABLE
+    if load.gas and not inside_table(load.isentrope, (radius / load.charge_radius) ** 2):
+        return OUT_OF_TABLE
+    return OK
+
+
+@kernel
+def march(case: Annulus) -> March:
+    """Run an annulus to its end state."""
+    load = case.load
+    schedule = schedule_of(case)
+    body, model, work, clock, active = prepare(case)
     record = np.empty((2048, 3))
-    time = 0.0
-    active = min(4, case.zones)
-    dt = 1e-9 * body.width[0] / wave_speed
-    _, fallbacks = update_zones(body, active, dt, material, model, work)
-    now = wall_pressure(load, 0.0, body.radius[0])
-    body.force[0] += now * body.radius[0]
-    record[0, 0], record[0, 1], record[0, 2] = 0.0, body.radius[0], now
-    dt = 1e-2 * case.courant * body.width[0] / wave_speed
-    previous, last_speed, peak = 0.0, 0.0, 0.0
-    reversal, end, status, steps = 0.0, case.end_time, _NOT_CONVERGED, 0
-    while steps < case.max_steps:
-        finished = end > 0.0 and time + dt * (1.0 + 1e-9) >= end
+    record[0, 0], record[0, 1], record[0, 2] = 0.0, body.radius[0], clock.pressure
+    peak = 0.0
+    status, steps, fallbacks = status_after(load, clock, 1.0, body.radius[0]), 0, 0
+    if status == OK:
+        status = NOT_CONVERGED
+    while status == NOT_CONVERGED and steps < case.max_steps:
+        finished = is_last(clock)
         if finished:
-            dt = end - time
-        _kick(body, active, 0.5 * (previous + dt), case, work)
+            clock = last_step(clock)
+        _kick(body, active, 0.5 * (clock.previous_step + clock.step), case, work)
         peak = max(peak, abs(body.velocity[0]))
-        if active < case.zones and abs(body.velocity[active - 1]) > _AT_REST * peak:
+        if active < case.zones and abs(body.velocity[active - 1]) > AT_REST * peak:
             active += 1
         old_radius = body.radius[0]
-        moving = active + 1 if active == case.zones else active
-        for i in range(moving):
-            body.radius[i] += dt * body.velocity[i]
-        time += dt
+        for i in range(active + 1):
+            body.radius[i] += clock.step * body.velocity[i]
         steps += 1
-        limit, failed = update_zones(body, active, dt, material, model, work)
+        limit, failed = update_zones(body, active, clock.step, case.material, model, work)
         fallbacks += failed
-        new = wall_pressure(load, time, body.radius[0])
-        body.force[0] += new * body.radius[0]
-        _load_work(load, old_radius, body.radius[0], now, new, work)
-        now = new
+        radius = body.radius[0]
+        before = clock
+        clock = after_step(
+            schedule, clock, limit, full_pressure(load, radius), radius, body.force[0],
+            body.velocity[0], body.mass[0],
+        )  # fmt: skip
+        body.force[0] += clock.pressure * radius
+        done, ramp = load_work(before, clock, old_radius, radius)
+        work[LOAD] += done
+        work[RAMP] += ramp
         record = _longer(record, steps)
-        record[steps, 0], record[steps, 1], record[steps, 2] = time, body.radius[0], now
-        speed = body.velocity[0] + 0.5 * dt * body.force[0] / body.mass[0]
-        if limit <= 0.0 or not np.isfinite(speed):
-            status = _UNSTABLE
-            break
-        if load.gas and not inside_table(
-            load.isentrope, (body.radius[0] / load.charge_radius) ** 2
-        ):
-            status = _OUT_OF_TABLE
-            break
-        if reversal == 0.0 and speed <= 0.0 and last_speed > 0.0 and time > load.rise_time:
-            reversal = time - dt * speed / (speed - last_speed)
-            if end == 0.0:
-                end = case.settling_factor * reversal
-        last_speed = speed
-        previous = dt
-        if finished:
-            status = _OK
-            break
-        dt = min(STEP_GROWTH * dt, case.courant * limit)
+        record[steps, 0], record[steps, 1], record[steps, 2] = clock.time, radius, clock.pressure
+        status = status_after(load, clock, limit, radius)
+        if status == OK and not finished:
+            status = NOT_CONVERGED
     return March(
-        status, body, record[: steps + 1].copy(), work, reversal, last_speed, 0.5 * previous,
-        steps, fallbacks,
+        status, body, record[: steps + 1].copy(), work, clock.reversal, clock.speed,
+        0.5 * clock.previous_step, active, steps, fallbacks,
     )  # fmt: skip

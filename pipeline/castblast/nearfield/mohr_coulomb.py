@@ -26,13 +26,12 @@ stress and logarithmic strain), strengths are passed with every call because the
 
 from __future__ import annotations
 
-from math import sin
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.kernel import kernel
+from castblast.kernel import fused_kernel, kernel
 
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int64]
@@ -60,8 +59,8 @@ _FIRST_EDGE = 2
 TOLERANCE = 1e-10
 
 
-class YieldModel(NamedTuple):
-    """Everything of the return that a run needs only once.
+class PlaneStrength(NamedTuple):
+    """What the return by one plane needs of a rock.
 
     Attributes
     ----------
@@ -73,10 +72,6 @@ class YieldModel(NamedTuple):
         lambda + 2 G.
     shear_compliance : float [1/Pa]
         Multiplier per excess stress on the plane (1, 3) alone.
-    size : int array (11,)
-        Planes in each active set of `_SETS`; 0 if the set is singular for this material.
-    inverse : array (11, 3, 3) [1/Pa]
-        Inverse of n_i . D g_j of each set.
     """
 
     friction: float
@@ -85,6 +80,21 @@ class YieldModel(NamedTuple):
     twice_shear: float
     stiffness: float
     shear_compliance: float
+
+
+class YieldModel(NamedTuple):
+    """Everything of the return that a run needs only once.
+
+    Attributes
+    ----------
+    planes : PlaneStrength
+    size : int array (11,)
+        Planes in each active set of `_SETS`; 0 if the set is singular for this material.
+    inverse : array (11, 3, 3) [1/Pa]
+        Inverse of n_i . D g_j of each set.
+    """
+
+    planes: PlaneStrength
     size: IntArray
     inverse: FloatArray
 
@@ -100,7 +110,9 @@ class ReturnedStress(NamedTuple):
     tensile_radial, tensile_hoop, tensile_axial : float [-]
         Plastic strain from tension planes.
     multiplier : float [-]
-        Plastic shear multiplier of the most compressive direction.
+        Sum of the shear multipliers.
+    opening : float [-]
+        Sum of the multipliers of tension.
     fallback : bool
         No set of planes was admissible.
     """
@@ -115,17 +127,19 @@ class ReturnedStress(NamedTuple):
     tensile_hoop: float
     tensile_axial: float
     multiplier: float
+    opening: float
     fallback: bool
 
 
-def friction_number(angle: float) -> float:
-    """N = (1 + sin) / (1 - sin) of a friction or dilation angle [rad]."""
-    return (1.0 + sin(angle)) / (1.0 - sin(angle))
+def friction_number(angle: FloatArray) -> FloatArray:
+    """N = (1 + sin) / (1 - sin) of friction or dilation angles [rad]."""
+    sine = np.sin(angle)
+    return np.asarray((1.0 + sine) / (1.0 - sine))
 
 
-def apex_tension(ucs: float, friction_angle: float) -> float:
+def apex_tension(ucs: FloatArray, friction_angle: FloatArray) -> FloatArray:
     """Isotropic tension at the apex of the cone, c / tan phi = UCS / (N - 1) [Pa]."""
-    return ucs / (friction_number(friction_angle) - 1.0)
+    return np.asarray(ucs / (friction_number(friction_angle) - 1.0))
 
 
 @kernel
@@ -210,9 +224,10 @@ def make_yield_model(
         # Without dilation the three shear flows are dependent: the set {13, 12, 23} drops out.
         if _invert(matrix, n, inverse[s]):
             size[s] = n
-    return YieldModel(
-        friction, dilation, lame, twice_shear, lame + twice_shear, inverse[0, 0, 0], size, inverse
+    planes = PlaneStrength(
+        friction, dilation, lame, twice_shear, lame + twice_shear, inverse[0, 0, 0]
     )
+    return YieldModel(planes, size, inverse)
 
 
 @kernel
@@ -256,6 +271,93 @@ def _share(first: int, second: int, third: int, plane: int, a: float, b: float, 
     return c if plane == third else 0.0
 
 
+class SinglePlane(NamedTuple):
+    """Return of a trial stress by one plane, on the axes radial, hoop, axial.
+
+    Attributes
+    ----------
+    radial, hoop, axial : float [Pa]
+        The trial stress itself where it is admissible or where one plane is not enough.
+    shear, opening : float [-]
+        Multipliers of the shear plane (1, 3) and of the tension plane; at most one is not zero.
+    shear_radial, shear_hoop, shear_axial : float [-]
+        Plastic strain of shear.
+    opening_radial, opening_hoop, opening_axial : float [-]
+        Plastic strain of tension.
+    shear_excess, tensile_excess : float [Pa]
+        How far the trial lies beyond either plane; negative inside.
+    solved : bool
+        False: an edge or a corner is needed, `return_to_yield` finds it.
+    """
+
+    radial: float
+    hoop: float
+    axial: float
+    shear: float
+    opening: float
+    shear_radial: float
+    shear_hoop: float
+    shear_axial: float
+    opening_radial: float
+    opening_hoop: float
+    opening_axial: float
+    shear_excess: float
+    tensile_excess: float
+    solved: bool
+
+
+@fused_kernel
+def single_plane_return(
+    strength: PlaneStrength, radial: float, hoop: float, axial: float, ucs: float, tension: float
+) -> SinglePlane:
+    """Return a trial stress by the one plane that nearly every return needs.
+
+    Without a branch, so that a loop over many rocks becomes vector code: whatever does not apply
+    is computed all the same and not selected. Arguments as in `return_to_yield`.
+    """
+    friction, dilation = strength.friction, strength.dilation
+    lame, twice_shear = strength.lame, strength.twice_shear
+    high = max(radial, max(hoop, axial))  # noqa: PLW3301  (two operands: vector instructions)
+    low = min(radial, min(hoop, axial))  # noqa: PLW3301
+    mid = max(min(radial, hoop), min(max(radial, hoop), axial))
+    shear_excess, tensile_excess = friction * high - low - ucs, high - tension
+    tolerance = TOLERANCE * (abs(low) + abs(high) + ucs)
+    a = strength.shear_compliance * max(shear_excess, 0.0)
+    volume = lame * (dilation - 1.0) * a
+    sheared = _admissible(
+        friction, low - volume + twice_shear * a, mid - volume,
+        high - volume - twice_shear * dilation * a, ucs, tension, tolerance,
+    )  # fmt: skip
+    b = tensile_excess / strength.stiffness
+    opened = (tensile_excess > 0.0) & _admissible(
+        friction, low - lame * b, mid - lame * b, tension, ucs, tension, tolerance
+    )
+    a = a if sheared else 0.0
+    b = b if opened and not sheared else 0.0
+    # Axes of the most and of the least compressive stress; equal ones in the order of `_rank`.
+    radial_low = (radial <= hoop) & (radial <= axial)
+    hoop_low = (not radial_low) & (hoop <= axial)
+    axial_low = (not radial_low) & (not hoop_low)
+    axial_high = (not axial_low) & (axial >= hoop) & (axial >= radial)
+    hoop_high = (not hoop_low) & (not axial_high) & (hoop >= radial)
+    radial_high = (not hoop_high) & (not axial_high)
+    dilated = dilation * a
+    shear_r = -a if radial_low else (dilated if radial_high else 0.0)
+    shear_h = -a if hoop_low else (dilated if hoop_high else 0.0)
+    shear_a = -a if axial_low else (dilated if axial_high else 0.0)
+    opening_r = b if radial_high else 0.0
+    opening_h = b if hoop_high else 0.0
+    opening_a = b if axial_high else 0.0
+    volume = lame * ((dilation - 1.0) * a + b)
+    return SinglePlane(
+        radial - volume - twice_shear * (shear_r + opening_r),
+        hoop - volume - twice_shear * (shear_h + opening_h),
+        axial - volume - twice_shear * (shear_a + opening_a),
+        a, b, shear_r, shear_h, shear_a, opening_r, opening_h, opening_a,
+        shear_excess, tensile_excess, sheared or opened,
+    )  # fmt: skip
+
+
 @kernel
 def return_to_yield(
     model: YieldModel, radial: float, hoop: float, axial: float, ucs: float, tension: float
@@ -272,40 +374,29 @@ def return_to_yield(
     tension : float [Pa]
         Tensile strength, at most `ucs` / (N - 1).
     """
-    friction, lame, twice_shear = model.friction, model.lame, model.twice_shear
-    i, j = _rank(radial, hoop, axial)
-    low, high = min(radial, hoop, axial), max(radial, hoop, axial)
-    mid = radial if j == 0 else (hoop if j == 1 else axial)
-    if friction * high - low <= ucs and high <= tension:
-        return _unsorted(i, j, low, mid, high, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False)
-    tolerance = TOLERANCE * (abs(low) + abs(high) + ucs)
-    least = -tolerance / model.stiffness
-    # Sets of one plane are nearly all the returns of a run: no search for them.
-    a = model.shear_compliance * (friction * high - low - ucs)
-    if a >= least:
-        volume = lame * (model.dilation - 1.0) * a
-        s1, s2 = low - volume + twice_shear * a, mid - volume
-        s3 = high - volume - twice_shear * model.dilation * a
-        if _admissible(friction, s1, s2, s3, ucs, tension, tolerance):
-            p1, p3 = -a, model.dilation * a
-            return _unsorted(i, j, s1, s2, s3, p1, 0.0, p3, 0.0, 0.0, 0.0, a, False)
-    a = (high - tension) / model.stiffness
-    if a >= least:
-        s1, s2 = low - lame * a, mid - lame * a
-        if _admissible(friction, s1, s2, tension, ucs, tension, tolerance):
-            return _unsorted(i, j, s1, s2, tension, 0.0, 0.0, 0.0, 0.0, 0.0, a, 0.0, False)
-    return _search(model, i, j, low, mid, high, ucs, tension, tolerance)
+    one = single_plane_return(model.planes, radial, hoop, axial, ucs, tension)
+    if one.solved:
+        return ReturnedStress(
+            one.radial, one.hoop, one.axial, one.shear_radial, one.shear_hoop, one.shear_axial,
+            one.opening_radial, one.opening_hoop, one.opening_axial, one.shear, one.opening, False,
+        )  # fmt: skip
+    return edge_return(model, radial, hoop, axial, ucs, tension)
 
 
 @kernel
-def _search(
-    model: YieldModel, i: int, j: int, low: float, mid: float, high: float, ucs: float,
-    tension: float, tolerance: float,
-) -> ReturnedStress:  # fmt: skip
-    """Edges and corners: try the active sets of two and three planes on sorted stresses."""
+def edge_return(
+    model: YieldModel, radial: float, hoop: float, axial: float, ucs: float, tension: float
+) -> ReturnedStress:
+    """Edges and corners: try the active sets of two and three planes; see `return_to_yield`."""
     size, inverse = model.size, model.inverse
-    friction, lame, twice_shear = model.friction, model.lame, model.twice_shear
-    least = -tolerance / model.stiffness
+    planes = model.planes
+    friction, dilation = planes.friction, planes.dilation
+    lame, twice_shear = planes.lame, planes.twice_shear
+    i, j = _rank(radial, hoop, axial)
+    low, high = min(radial, hoop, axial), max(radial, hoop, axial)
+    mid = radial if j == 0 else (hoop if j == 1 else axial)
+    tolerance = TOLERANCE * (abs(low) + abs(high) + ucs)
+    least = -tolerance / planes.stiffness
     for s in range(_FIRST_EDGE, size.size):
         if size[s] == 0:
             continue
@@ -321,7 +412,7 @@ def _search(
         l13 = _share(first, second, third, 0, a, b, c)
         l12 = _share(first, second, third, 1, a, b, c)
         l23 = _share(first, second, third, 2, a, b, c)
-        p1, p2, p3 = -l13 - l12, model.dilation * l12 - l23, model.dilation * (l13 + l23)
+        p1, p2, p3 = -l13 - l12, dilation * l12 - l23, dilation * (l13 + l23)
         t1 = _share(first, second, third, 5, a, b, c)
         t2 = _share(first, second, third, 4, a, b, c)
         t3 = _share(first, second, third, 3, a, b, c)
@@ -330,27 +421,29 @@ def _search(
         s2 = mid - volume - twice_shear * (p2 + t2)
         s3 = high - volume - twice_shear * (p3 + t3)
         if _admissible(friction, s1, s2, s3, ucs, tension, tolerance):
-            return _unsorted(i, j, s1, s2, s3, p1, p2, p3, t1, t2, t3, l13 + l12 + l23, False)
+            sheared = l13 + l12 + l23
+            return _unsorted(i, j, s1, s2, s3, p1, p2, p3, t1, t2, t3, sheared, False)
     spread = (low + mid + high - 3.0 * tension) / (3.0 * (3.0 * lame + twice_shear))
     return _unsorted(
         i, j, tension, tension, tension, 0.0, 0.0, 0.0, spread, spread, spread, 0.0, True
     )
 
 
-@kernel
+@fused_kernel
 def _admissible(
     friction: float, s1: float, s2: float, s3: float, ucs: float, tension: float, tolerance: float
 ) -> bool:
-    """All six planes, on the axes as sorted by the trial stress."""
+    """All six planes, on the axes as sorted by the trial stress; without a branch."""
     limit = ucs + friction * tolerance
-    return (
-        friction * s3 - s1 <= limit
-        and friction * s2 - s1 <= limit
-        and friction * s3 - s2 <= limit
-        and s3 <= tension + tolerance
-        and s2 <= tension + tolerance
-        and s1 <= tension + tolerance
+    shear = (
+        (friction * s3 - s1 <= limit)
+        & (friction * s2 - s1 <= limit)
+        & (friction * s3 - s2 <= limit)
     )
+    tensile = (
+        (s3 <= tension + tolerance) & (s2 <= tension + tolerance) & (s1 <= tension + tolerance)
+    )
+    return shear & tensile
 
 
 @kernel
@@ -370,5 +463,6 @@ def _unsorted(
         _on_axis(1, i, j, t1, t2, t3),
         _on_axis(2, i, j, t1, t2, t3),
         shear,
+        t1 + t2 + t3,
         fallback,
     )

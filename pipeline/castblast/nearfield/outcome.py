@@ -1,4 +1,7 @@
-"""What a march of the annulus means: end state, zones of damage, histories."""
+"""What a march of the annulus means: end state, zones of damage, histories.
+
+`end_state` names its numbers by position: `STATE_NAMES`, in the order of `NearFieldResult`.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +9,51 @@ from typing import NamedTuple
 
 import numpy as np
 
+from castblast.errors import Status
+from castblast.explosive.isentrope import energy, pressure
 from castblast.kernel import kernel
 from castblast.nearfield.lagrangian import (
-    CRUSHED_UNDER_HOOP_COMPRESSION,
-    SHEAR_YIELD,
-    TENSILE_YIELD,
+    BOUNDARY,
+    LOAD,
+    RAMP,
+    SHEAR,
+    TENSION,
+    VISCOUS,
     Body,
     FloatArray,
-    IntArray,
+    elastic_energy,
+    kinetic_energy,
 )
+from castblast.nearfield.march import Annulus, March
 
+_OK = int(Status.OK)
+_RETURN_MAP_FAILED = int(Status.RETURN_MAP_FAILED)
+_LEDGER_OPEN = int(Status.LEDGER_OPEN)
+
+#: Numbers of an end state, in this order.
+STATE_NAMES = (
+    "status", "equilibrium_pressure", "expanded_hole_radius", "crushed_zone_radius",
+    "plastic_zone_radius", "hoop_crushed_radius", "tensile_zone_radius", "intense_shear_radius",
+    "explosion_pressure", "equilibrium_time", "end_time", "wall_velocity", "settled", "gas_work",
+    "kinetic_energy", "elastic_energy", "plastic_work", "tensile_work", "viscous_work",
+    "boundary_work", "head_energy", "ramp_energy", "gas_energy", "energy_residual", "n_steps",
+    "return_map_fallbacks",
+)  # fmt: skip
+#: The hole radius is averaged from this time on, in units of the time at which it turns back.
+WINDOW_START = 1.3
+#: Relative swing of the hole radius in the window below which the hole has settled.
+SETTLED_SWING = 0.01
+#: Wall velocity over wave speed below which the hole has settled (paper mode).
+SETTLED_VELOCITY = 1e-3
+#: Largest open share of the energy ledger.
+LEDGER_TOLERANCE = 1e-3
+_STEPS, _FALLBACKS, _SETTLED = (
+    STATE_NAMES.index(name) for name in ("n_steps", "return_map_fallbacks", "settled")
+)
 #: Plastic shear multiplier that bounds the crushed zone.
 CRUSHED_STRAIN = 0.01
+#: Plastic multiplier that counts as yield: far below any elastic strain at yield.
+YIELD_STRAIN = 1e-6
 #: Accumulated plastic strain that bounds the zone of intense shear.
 INTENSE_STRAIN = 0.2
 
@@ -82,7 +118,7 @@ def threshold_radius(nodes: FloatArray, strain: FloatArray, threshold: float) ->
         Values at zone centres.
     """
     for j in range(strain.size - 1, -1, -1):
-        if strain[j] < threshold:
+        if strain[j] <= threshold:
             continue
         centre = 0.5 * (nodes[j] + nodes[j + 1])
         if j == strain.size - 1:
@@ -94,41 +130,99 @@ def threshold_radius(nodes: FloatArray, strain: FloatArray, threshold: float) ->
 
 
 @kernel
-def outermost(nodes: FloatArray, history: IntArray, bit: int) -> float:
-    """Outer initial radius [m] of the last zone with a bit set; the wall if none has it."""
-    for j in range(history.size - 1, -1, -1):
-        if history[j] & bit:
-            return float(nodes[j + 1])
-    return float(nodes[0])
-
-
-@kernel
 def damage_radii(body: Body) -> tuple[float, float, float, float, float]:
     """Initial radii [m]: crushed, plastic, crushed under hoop compression, tensile, intense."""
     nodes = body.initial_radius
     return (
         threshold_radius(nodes, body.shear_multiplier, CRUSHED_STRAIN),
-        outermost(nodes, body.history, SHEAR_YIELD),
-        outermost(nodes, body.history, CRUSHED_UNDER_HOOP_COMPRESSION),
-        outermost(nodes, body.history, TENSILE_YIELD),
+        threshold_radius(nodes, body.shear_multiplier, YIELD_STRAIN),
+        threshold_radius(nodes, body.hoop_multiplier, YIELD_STRAIN),
+        threshold_radius(nodes, body.tensile_multiplier, YIELD_STRAIN),
         threshold_radius(nodes, body.shear_strain, INTENSE_STRAIN),
     )
 
 
 @kernel
-def histories(record: FloatArray, points: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+def histories(record: FloatArray, out: FloatArray) -> None:
     """Time [s], pressure [Pa] and radius [m] on a fixed number of points, dense at the start.
 
     The times are end * (k / (points - 1))^2, k = 0 ... points - 1; values are interpolated
-    between steps.
+    between steps. `out` (3, points) is filled.
     """
     end = record[-1, 0]
-    time = np.empty(points)
+    points = out.shape[1]
     for k in range(points):
         share = k / (points - 1)
-        time[k] = end * share * share
-    return (
-        time,
-        np.interp(time, record[:, 0], record[:, 2]),
-        np.interp(time, record[:, 0], record[:, 1]),
+        out[0, k] = end * share * share
+    out[1] = np.interp(out[0], record[:, 0], record[:, 2])
+    out[2] = np.interp(out[0], record[:, 0], record[:, 1])
+
+
+@kernel
+def no_state(status: int, steps: int, fallbacks: int, out: FloatArray) -> None:
+    """End state that holds nothing but its status and counts."""
+    out[:] = np.nan
+    out[0], out[_STEPS], out[_FALLBACKS], out[_SETTLED] = status, steps, fallbacks, 0.0
+
+
+@kernel
+def end_state(case: Annulus, run: March, total_energy: float, out: FloatArray) -> None:
+    """Read the end state off a march.
+
+    Parameters
+    ----------
+    case : Annulus
+    run : March
+    total_energy : float [J m-3]
+        Of the explosive, per initial volume.
+    out : array (len(STATE_NAMES),)
+        Filled; NaN if the march has no end state.
+    """
+    if run.status != _OK:
+        no_state(run.status, run.steps, run.fallbacks, out)
+        return
+    record, load = run.record, case.load
+    end = record[-1, 0]
+    if case.end_time > 0.0:
+        radius = record[-1, 1]
+        material = case.material
+        stiffness = material.bulk_modulus + 4.0 / 3.0 * material.shear_modulus
+        wave_speed = np.sqrt(stiffness / material.density)
+        settled = abs(run.wall_velocity) < SETTLED_VELOCITY * wave_speed
+    else:
+        window = mean_over(record, WINDOW_START * run.reversal_time, end)
+        radius = window.mean
+        settled = window.highest - window.lowest < SETTLED_SWING * radius
+    crushed, plastic, hoop, tensile, intense = damage_radii(run.body)
+    per_charge = 1.0 / (load.charge_radius * load.charge_radius)
+    charge = np.pi * load.charge_radius * load.charge_radius
+    volume = radius * radius * per_charge
+    start_volume = case.inner_radius * case.inner_radius * per_charge
+    final_volume = record[-1, 1] * record[-1, 1] * per_charge
+    turn = 2.0 * np.pi
+    work = run.work
+    kinetic = turn * kinetic_energy(run.body, run.active, run.half_kick)
+    initial = case.in_situ_stress**2 / (2.0 * case.material.bulk_modulus)
+    elastic = turn * (
+        elastic_energy(run.body, case.material) - initial * run.body.initial_area.sum()
     )
+    done = turn * work[LOAD]
+    spent = turn * (work[SHEAR] + work[TENSION] + work[VISCOUS] + work[BOUNDARY])
+    residual = (done - kinetic - elastic - spent) / done if done != 0.0 else np.nan
+    status = _OK
+    if run.fallbacks > 0:
+        status = _RETURN_MAP_FAILED
+    elif not abs(residual) <= LEDGER_TOLERANCE:
+        status = _LEDGER_OPEN
+    values = (
+        float(status), pressure(load.isentrope, volume), radius, crushed, plastic, hoop, tensile,
+        intense, pressure(load.isentrope, start_volume),
+        last_time_outside(record, radius, 0.01 * radius), end, run.wall_velocity,
+        1.0 if settled else 0.0, done, kinetic, elastic, turn * work[SHEAR], turn * work[TENSION],
+        turn * work[VISCOUS], turn * work[BOUNDARY],
+        charge * (total_energy - energy(load.isentrope, start_volume)), turn * work[RAMP],
+        charge * energy(load.isentrope, final_volume), residual, float(run.steps),
+        float(run.fallbacks),
+    )  # fmt: skip
+    for k in range(len(values)):  # noqa: PLC0200
+        out[k] = values[k]

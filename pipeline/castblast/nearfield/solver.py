@@ -24,59 +24,22 @@ the definition (with a tensile strength of UCS / 12 the pressure stays within 0.
 
 from __future__ import annotations
 
-from math import isfinite, pi, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from castblast.errors import Status
-from castblast.explosive.isentrope import (
-    Explosive,
-    ProductIsentrope,
-    energy,
-    inside_table,
-    pressure,
+from castblast.explosive.isentrope import Explosive, ProductIsentrope
+from castblast.nearfield.case import Hole, NearFieldColumns, NearFieldSettings, Rock
+from castblast.nearfield.lagrangian import FloatArray
+from castblast.nearfield.march import Annulus, march
+from castblast.nearfield.outcome import STATE_NAMES, end_state, histories, no_state
+from castblast.nearfield.setup import (
+    common_parameters,
+    hole_parameters,
+    make_annulus,
+    possible,
 )
-from castblast.nearfield.case import EndMode, Hole, NearFieldSettings, Rock, TensionMode
-from castblast.nearfield.lagrangian import (
-    BOUNDARY,
-    LOAD,
-    RAMP,
-    SHEAR,
-    TENSION,
-    VISCOUS,
-    FloatArray,
-    Material,
-    elastic_energy,
-    kinetic_energy,
-)
-from castblast.nearfield.march import Annulus, March, WallLoad, march
-from castblast.nearfield.mohr_coulomb import apex_tension, friction_number
-from castblast.nearfield.outcome import damage_radii, histories, last_time_outside, mean_over
-
-#: Outer radius of the published model [m].
-PAPER_RADIUS = 5.5
-#: Share of the travel time of the p-wave to the outer boundary at which it ends.
-PAPER_END = 0.9
-#: Outer radius of the equilibrium mode in hole radii. Zones that no wave has reached cost nothing;
-#: only in the weakest dilatant rock does anything beyond 250 hole radii matter.
-EQUILIBRIUM_RADII = 1000.0
-#: Zones of the two modes, and width of the first one in hole radii at that number of zones.
-#: Equilibrium mode against 400 zones, 24 random designs: pressure within 0.3 percent.
-PAPER_ZONES, PAPER_WIDTH = 256, 0.04
-EQUILIBRIUM_ZONES, EQUILIBRIUM_WIDTH = 144, 0.12
-#: The end state is the mean over this window, in units of the time at which the wall turns back.
-WINDOW = (1.3, 1.8)
-#: Relative swing of the hole radius in the window below which the hole has settled.
-SETTLED_SWING = 0.01
-#: Wall velocity over wave speed below which the hole has settled (paper mode).
-SETTLED_VELOCITY = 1e-3
-#: Largest open share of the energy ledger.
-LEDGER_TOLERANCE = 1e-3
-#: Share of the largest stable step.
-COURANT = 0.85
-_MAX_STEPS = 300_000
-_MOST_DECOUPLED = 100.0
 
 
 class NearFieldResult(NamedTuple):
@@ -94,8 +57,8 @@ class NearFieldResult(NamedTuple):
         Initial radius inside which the plastic shear multiplier of the most compressive
         direction is at least 1 percent, interpolated between zone centres.
     plastic_zone_radius, hoop_crushed_radius, tensile_zone_radius : float [m]
-        Outermost shear yield, shear yield under compressive hoop stress, tensile yield (initial
-        radii, in steps of a zone).
+        Outermost shear yield, shear yield under compressive hoop stress, tensile yield: initial
+        radii, interpolated inside a zone by how far the next one stayed from yielding.
     intense_shear_radius : float [m]
         Initial radius inside which the accumulated plastic strain exceeds 20 percent.
     explosion_pressure : float [Pa]
@@ -163,102 +126,31 @@ def solve_near_field(
     NearFieldResult
         `status` says what went wrong, if anything; no exception is raised for any input.
     """
-    if not _possible(explosive, rock, hole, settings):
-        return _no_result(Status.BAD_INPUT, settings)
-    explosive = explosive._replace(isentrope=_plain(explosive.isentrope))
-    start = (hole.diameter / hole.charge_diameter) ** 2
-    if not inside_table(explosive.isentrope, start):
-        return _no_result(Status.OUT_OF_ISENTROPE, settings)
-    case = _annulus(explosive, rock, hole, settings)
-    run = march(case)
-    if run.status != Status.OK:
-        failed = _no_result(Status(run.status), settings)
-        return failed._replace(n_steps=run.steps, return_map_fallbacks=run.fallbacks)
-    return _result(explosive, hole, settings, case, run)
+    state = np.empty(len(STATE_NAMES))
+    points = np.full((3, max(settings.history_points, 2)), np.nan)
+    if not possible((explosive,), _column(rock, hole), settings)[0]:
+        no_state(int(Status.BAD_INPUT), 0, 0, state)
+        return _result(state, points)
+    run = march(annulus := _annulus(explosive, rock, hole, settings))
+    end_state(annulus, run, float(explosive.total_energy), state)
+    if run.status == Status.OK:
+        histories(run.record, points)
+    return _result(state, points)
 
 
-def _possible(explosive: Explosive, rock: Rock, hole: Hole, settings: NearFieldSettings) -> bool:
-    """Say whether the inputs describe a case at all."""
-    numbers = (*rock, *hole, settings.outer_radius, settings.quadratic_viscosity,
-               settings.linear_viscosity, explosive.total_energy)  # fmt: skip
-    if not all(isfinite(x) for x in numbers):
-        return False
-    return (
-        rock.density > 0.0
-        and rock.young_modulus > 0.0
-        and 0.0 <= rock.poisson_ratio < 0.5
-        and rock.ucs > 0.0
-        and 0.0 < rock.friction_angle < 0.5 * pi
-        and 0.0 <= rock.dilation_angle <= rock.friction_angle
-        and rock.tensile_strength >= 0.0
-        and 0.0 < hole.charge_diameter <= hole.diameter <= _MOST_DECOUPLED * hole.charge_diameter
-        and hole.rise_time >= 0.0
-        and hole.in_situ_stress >= 0.0
-        and (settings.outer_radius == 0.0 or settings.outer_radius > 0.5 * hole.diameter)
-        and (settings.zones == 0 or settings.zones >= 8)
-        and settings.quadratic_viscosity >= 0.0
-        and settings.linear_viscosity >= 0.0
-        and settings.history_points >= 2
-        and settings.mode in tuple(EndMode)
-        and settings.tension in tuple(TensionMode)
-        and isfinite(sum(float(x) for x in explosive.isentrope[1:7]))
-    )
-
-
-def _material(rock: Rock, settings: NearFieldSettings) -> Material:
-    """Strengths and moduli; the tensile strength never lies beyond the apex of the cone."""
-    apex = apex_tension(rock.ucs, rock.friction_angle)
-    tension = apex if settings.tension == TensionMode.NONE else min(rock.tensile_strength, apex)
-    return Material(
-        float(rock.density),
-        rock.young_modulus / (3.0 * (1.0 - 2.0 * rock.poisson_ratio)),
-        rock.young_modulus / (2.0 * (1.0 + rock.poisson_ratio)),
-        float(rock.ucs),
-        float(tension),
-        bool(settings.tension == TensionMode.BRITTLE),
-        float(settings.quadratic_viscosity),
-        float(settings.linear_viscosity),
-    )
+def _column(rock: Rock, hole: Hole) -> NearFieldColumns:
+    """One hole as columns of length one."""
+    numbers = (np.array([x], dtype=np.float64) for x in (*rock, *hole))
+    return NearFieldColumns(np.zeros(1, dtype=np.int64), *numbers)
 
 
 def _annulus(explosive: Explosive, rock: Rock, hole: Hole, settings: NearFieldSettings) -> Annulus:
-    """Set up the march of one hole; every number as float, for one signature of the kernel."""
-    material = _material(rock, settings)
-    inner = 0.5 * hole.diameter
-    paper = settings.mode == EndMode.PAPER
-    outer = settings.outer_radius or (PAPER_RADIUS if paper else EQUILIBRIUM_RADII * inner)
-    default, width = (PAPER_ZONES, PAPER_WIDTH) if paper else (EQUILIBRIUM_ZONES, EQUILIBRIUM_WIDTH)
-    zones = settings.zones or default
-    wave_speed = sqrt(
-        (material.bulk_modulus + 4.0 / 3.0 * material.shear_modulus) / material.density
-    )
-    load = WallLoad(
-        True,
-        explosive.isentrope,
-        0.5 * hole.charge_diameter,
-        float(hole.in_situ_stress),
-        0.0,
-        float(hole.rise_time),
-    )
-    return Annulus(
-        material,
-        friction_number(rock.friction_angle),
-        friction_number(rock.dilation_angle),
-        float(inner),
-        float(outer),
-        width * inner * default / zones,
-        int(zones),
-        float(hole.in_situ_stress),
-        True,
-        load,
-        PAPER_END * (outer - inner) / wave_speed if paper else 0.0,
-        WINDOW[1],
-        COURANT,
-        _MAX_STEPS,
-    )
+    """Annulus of one hole."""
+    holes = hole_parameters((explosive,), _column(rock, hole), settings)
+    return make_annulus(holes, 0, common_parameters(settings), plain(explosive.isentrope))
 
 
-def _plain(isentrope: ProductIsentrope) -> ProductIsentrope:
+def plain(isentrope: ProductIsentrope) -> ProductIsentrope:
     """The isentrope with the exact types of the compiled signature."""
     i = isentrope
     scalars = [float(x) for x in (i.a, i.b, i.c, i.r1, i.r2, i.omega)]
@@ -269,57 +161,13 @@ def _plain(isentrope: ProductIsentrope) -> ProductIsentrope:
     return ProductIsentrope(bool(i.tabulated), *scalars, *arrays)  # type: ignore[arg-type]
 
 
-def _result(
-    explosive: Explosive, hole: Hole, settings: NearFieldSettings, case: Annulus, run: March
-) -> NearFieldResult:
-    """Read the end state off a finished march."""
-    record = run.record
-    work = [2.0 * pi * float(w) for w in run.work]
-    end = float(record[-1, 0])
-    if settings.mode == EndMode.PAPER:
-        radius = float(record[-1, 1])
-        wave_speed = PAPER_END * (case.outer_radius - case.inner_radius) / case.end_time
-        settled = abs(run.wall_velocity) < SETTLED_VELOCITY * wave_speed
-    else:
-        window = mean_over(record, WINDOW[0] * run.reversal_time, end)
-        radius = window.mean
-        settled = window.highest - window.lowest < SETTLED_SWING * radius
-    crushed, plastic, hoop, tensile, intense = damage_radii(run.body)
-    isentrope = explosive.isentrope
-    volume = (2.0 * radius / hole.charge_diameter) ** 2
-    final_volume = (2.0 * float(record[-1, 1]) / hole.charge_diameter) ** 2
-    start_volume = (hole.diameter / hole.charge_diameter) ** 2
-    charge = 0.25 * pi * hole.charge_diameter**2
-    kinetic = 2.0 * pi * kinetic_energy(run.body, run.half_kick)
-    initial = case.in_situ_stress**2 / (2.0 * case.material.bulk_modulus)
-    elastic = (
-        2.0
-        * pi
-        * (elastic_energy(run.body, case.material) - initial * float(run.body.initial_area.sum()))
-    )
-    spent = kinetic + elastic + work[SHEAR] + work[TENSION] + work[VISCOUS] + work[BOUNDARY]
-    residual = (work[LOAD] - spent) / work[LOAD] if work[LOAD] != 0.0 else float("nan")
-    status = Status.OK
-    if run.fallbacks > 0:
-        status = Status.RETURN_MAP_FAILED
-    elif not abs(residual) <= LEDGER_TOLERANCE:
-        status = Status.LEDGER_OPEN
+def _result(state: FloatArray, points: FloatArray) -> NearFieldResult:
+    """Give the numbers of an end state their names and types."""
+    values: dict[str, Any] = dict(zip(STATE_NAMES, state.tolist(), strict=True))
+    for name in ("status", "n_steps", "return_map_fallbacks"):
+        values[name] = int(values[name])
+    values["settled"] = bool(values["settled"])
+    time, pressure, radius = points
     return NearFieldResult(
-        int(status), pressure(isentrope, volume), radius, crushed, plastic, hoop, tensile, intense,
-        pressure(isentrope, start_volume), last_time_outside(record, radius, 0.01 * radius), end,
-        run.wall_velocity, bool(settled), work[LOAD], kinetic, elastic, work[SHEAR], work[TENSION],
-        work[VISCOUS], work[BOUNDARY],
-        charge * (explosive.total_energy - energy(isentrope, start_volume)), work[RAMP],
-        charge * energy(isentrope, final_volume), residual, run.steps, run.fallbacks,
-        *histories(record, settings.history_points),
-    )  # fmt: skip
-
-
-def _no_result(status: Status, settings: NearFieldSettings) -> NearFieldResult:
-    """A result that holds nothing but its status."""
-    nan = float("nan")
-    empty = np.full(max(settings.history_points, 2), nan)
-    values: dict[str, Any] = dict.fromkeys(NearFieldResult._fields, nan)
-    values |= {"status": int(status), "settled": False, "n_steps": 0, "return_map_fallbacks": 0}
-    values |= {name: empty.copy() for name in NearFieldResult._fields[-3:]}
-    return NearFieldResult(**values)
+        **values, history_time=time, history_pressure=pressure, history_radius=radius
+    )
