@@ -6,10 +6,13 @@ from typing import Annotated, Any
 
 import typer
 
+from castblast.cli.options import OutFolder, Restart, Scheduler, Workers
 from castblast.cli.screen import Screen
 from castblast.cli.verb import verb
 
-app = typer.Typer(help="Check and describe a written dataset.", no_args_is_help=True)
+app = typer.Typer(
+    help="Check, describe, compare and extend written datasets.", no_args_is_help=True
+)
 
 _Dataset = Annotated[Path, typer.Argument(help="Dataset (netCDF).")]
 
@@ -54,6 +57,54 @@ def reproduce(
     outcome = reproduce_sample(dataset, sample)
     screen.table(("quantity", "stored", "recomputed", "relative difference"), outcome.rows)
     screen.say(outcome.verdict)
+    if not outcome.same:
+        screen.exit_code = 4
+    return outcome.document
+
+
+@verb(app)
+def extend(
+    screen: Screen,
+    dataset: _Dataset,
+    add: Annotated[int, typer.Option("--add", min=1, help="Samples to add.")],
+    out: OutFolder = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    restart: Restart = False,
+) -> Mapping[str, Any]:
+    """Add samples to a dataset: a new file with the next minor version; the old one stays."""
+    from castblast.stages.extend import extend as run
+
+    with screen.progress("extend") as progress:
+        outcome = run(
+            dataset,
+            add,
+            out,
+            workers=workers,
+            scheduler=scheduler,
+            restart=restart,
+            progress=progress,
+        )
+    for line in outcome.lines:
+        screen.say(line)
+    return outcome.document
+
+
+@verb(app)
+def diff(
+    screen: Screen,
+    first: Annotated[Path, typer.Argument(help="Dataset (netCDF).")],
+    second: Annotated[Path, typer.Argument(help="Another one, by the same ids.")],
+) -> Mapping[str, Any]:
+    """Say in what two datasets differ (exit code 4 if they do): making, variables, rows, values."""
+    from castblast.stages.diff import diff_datasets
+
+    with screen.progress("diff") as progress:
+        outcome = diff_datasets(first, second, progress)
+    for line in outcome.lines:
+        screen.say(line)
+    if outcome.rows:
+        screen.table(outcome.header, outcome.rows)
     if not outcome.same:
         screen.exit_code = 4
     return outcome.document

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from castblast.cli.options import OutFolder, Workers
+from castblast.cli.options import OutFolder, Restart, Scheduler, Workers
 from castblast.cli.screen import Screen
 from castblast.cli.verb import verb
 
@@ -19,11 +19,8 @@ def generate(
         int | None, typer.Option(min=1, help="Samples instead of the recipe's.", show_default=False)
     ] = None,
     workers: Workers = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(help="Address of a running Dask scheduler.", show_default=False),
-    ] = None,
-    restart: Annotated[bool, typer.Option("--restart", help="Discard earlier shards.")] = False,
+    scheduler: Scheduler = None,
+    restart: Restart = False,
 ) -> Mapping[str, Any]:
     """Simulate the samples of a recipe and write one netCDF file; resumes where it was stopped."""
     from castblast.stages.generate import generate as run

@@ -29,3 +29,7 @@ Workers: TypeAlias = Annotated[
         "--workers", min=1, help="Worker threads; default: all cores.", show_default=False
     ),
 ]
+Scheduler: TypeAlias = Annotated[
+    str | None, typer.Option(help="Address of a running Dask scheduler.", show_default=False)
+]
+Restart: TypeAlias = Annotated[bool, typer.Option("--restart", help="Discard earlier shards.")]

@@ -12,6 +12,7 @@ import xarray as xr
 
 from castblast.dataset.card import training_statistics
 from castblast.dataset.check import check
+from castblast.dataset.compare import relative_difference
 from castblast.dataset.failures import summary
 from castblast.dataset.provenance import SOURCES, explosive_from_text
 from castblast.dataset.schema import flag_counts, flag_names, names_with_role
@@ -24,7 +25,7 @@ from castblast.specs.recipe import recipe_from_text
 from castblast.variables import INPUT_NAMES, OUTPUT_NAMES, VARIABLES
 
 #: Deviation up to which a recomputed number is the same: last digits differ between processors.
-SAME = 1e-9
+SAME = 1e-10
 
 
 @dataclass(frozen=True)
@@ -141,7 +142,10 @@ def reproduce_sample(path: Path, sample: int) -> Reproduction:
     inputs = {key: np.array([float(stored[key])]) for key in INPUT_NAMES}
     result = blast_simulator(recipe, (explosive,)).run(inputs, np.zeros(1, dtype=np.int8))
     values = {key: (float(stored[key]), float(result.outputs[key][0])) for key in OUTPUT_NAMES}
-    deviations = {key: _deviation(key, *pair) for key, pair in values.items()}
+    deviations = {
+        key: float(relative_difference(key, *np.array(pair).reshape(2, 1))[0])
+        for key, pair in values.items()
+    }
     worst = max(deviations, key=lambda key: deviations[key])
     statuses = (Status(int(stored["status"])), Status(int(result.status[0])))
     same = statuses[0] == statuses[1] and deviations[worst] <= SAME
@@ -171,19 +175,6 @@ def _position(dataset: xr.Dataset, sample: int, path: Path) -> int:
         message = f"{path}: no sample {sample}; ids are {ids.min()} to {ids.max()}"
         raise SpecError(message)
     return int(found[0])
-
-
-def _deviation(name: str, stored: float, computed: float) -> float:
-    """Relative to the larger of the two; two NaNs are equal, one NaN is infinitely far.
-
-    A residual is the rounding of a balance: it is relative already.
-    """
-    if np.isnan(stored) and np.isnan(computed):
-        return 0.0
-    if np.isnan(stored) or np.isnan(computed):
-        return float("inf")
-    scale = 1.0 if name.endswith("residual") else max(abs(stored), abs(computed))
-    return abs(stored - computed) / scale if scale else 0.0
 
 
 def _verdict(same: bool, statuses: tuple[Status, Status], worst: str, deviation: float) -> str:

@@ -86,7 +86,7 @@ def generate(
     simulator = blast_simulator(
         source.recipe, tuple(entry.spec.to_explosive() for entry in explosives)
     )
-    path = _output_path(source, out)
+    path = output_path(source, out)
     return produce(
         source,
         explosives,
@@ -115,8 +115,7 @@ def produce(
     require_writable(path.parent)
     origin = made_from(recipe, explosives)
     if not restart and is_finished(path, origin):
-        line = f"{path}: finished already, from the same recipe"
-        return GenerateOutcome(path, (line,), _document(path))
+        return already_finished(path)
     progress(0.0, "drawing the design")
     design = make_design(recipe, simulator, str(source.path))
     folder = open_work_folder(path, origin, restart=restart).resolve()
@@ -127,6 +126,12 @@ def produce(
     rows = Rows(design, work.status, work.results())
     content = write_final(path, folder, source, explosives, rows, progress=progress)
     return finish(path, content, [*lines, summary(work.status)])
+
+
+def already_finished(path: Path) -> GenerateOutcome:
+    """Leave a dataset alone that is there, whole, and made from the same."""
+    line = f"{path}: finished already, from the same recipe"
+    return GenerateOutcome(path, (line,), _document(path))
 
 
 def finish(path: Path, content: str, lines: list[str]) -> GenerateOutcome:
@@ -141,7 +146,8 @@ def finish(path: Path, content: str, lines: list[str]) -> GenerateOutcome:
     return GenerateOutcome(path, (*lines, wrote), _document(path))
 
 
-def _output_path(source: RecipeSource, out: Path | None) -> Path:
+def output_path(source: RecipeSource, out: Path | None) -> Path:
+    """File of the dataset of a recipe; `out` is the file, or a folder for it."""
     if out is None:
         return Path("data") / source.recipe.name / source.recipe.version / "data.nc"
     return out if out.suffix == ".nc" else out / "data.nc"
