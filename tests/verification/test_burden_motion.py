@@ -97,7 +97,7 @@ class Reference:
         m, x, _, s = y[:4]
         tau = self.path / 2 / self.q.crack_velocity
         narrow, xp = 2 * self.radius, self.q.pressurised_width_ratio * self.path
-        wide = min(self.g.spacing, 2 * self.path)
+        wide = (self.g.spacing**-12 + (2 * self.path) ** -12) ** (-1 / 12)
         hole = pi * self.radius**2 * self.g.charge_length
         volume = hole * (1 + self.q.fracture_storage_ratio * (1 - exp(-t / tau)))
         volume += self.bore * s + self.g.charge_length * (

@@ -26,30 +26,24 @@ from castblast.burden.geometry import (
     burden_mass,
     explosive_mass,
     mean_burden,
-    pressurised_section,
-    pressurised_width,
+    pressurised_plane,
     rock_volume,
 )
 from castblast.burden.stemming import leakage_flux, stemming_acceleration
-from castblast.burden.venting import ATMOSPHERIC_PRESSURE, fracture_flux, nozzle_flux
-from castblast.explosive.isentrope import (
-    Explosive,
-    FloatArray,
-    ProductIsentrope,
-    energy,
-    pressure,
-    slope,
-)
-from castblast.kernel import kernel
+from castblast.burden.venting import ATMOSPHERIC_PRESSURE, fracture_flux, gas_outflow
+from castblast.explosive.isentrope import Explosive, FloatArray, ProductIsentrope, gas_state
+from castblast.kernel import inline_kernel, kernel
 
 GRAVITY: Final = 9.80665
 
-# Order of the state vector; integrals of the ledger ride along.
+# Order of the state vector: first what moves the system (`CORE_SIZE` states), then integrals that
+# only the ledger needs.
 GAS_MASS: Final = 0
 DISPLACEMENT: Final = 1
 VELOCITY: Final = 2
 PLUG_DISPLACEMENT: Final = 3
 PLUG_VELOCITY: Final = 4
+CORE_SIZE: Final = 5
 FRACTURE_MASS: Final = 5
 COLLAR_MASS: Final = 6
 BURDEN_WORK: Final = 7
@@ -133,29 +127,36 @@ def make_balance(
     )
 
 
-@kernel
+@inline_kernel
 def relative_volume(b: Balance, time: float, state: FloatArray) -> float:
     """Gas volume over the volume that its mass had as explosive [-]."""
-    section = pressurised_section(
+    _, section = pressurised_plane(
         state[DISPLACEMENT], b.hole_width, b.full_width, b.growth_distance
     )
+    emptiness = np.exp(-time / b.storage_time)
+    return _relative_volume(b, emptiness, section, state)
+
+
+@inline_kernel
+def _relative_volume(b: Balance, emptiness: float, section: float, state: FloatArray) -> float:
+    """As above, from exp(-t / tau) and the section opened behind the burden [m2]."""
     volume = (
         b.hole_volume
-        - b.storage_volume * np.expm1(-time / b.storage_time)
+        + b.storage_volume * (1.0 - emptiness)
         + b.charge_length * section
         + b.hole_area * state[PLUG_DISPLACEMENT]
     )
     return float(volume * b.explosive_density / state[GAS_MASS])
 
 
-@kernel
+@inline_kernel
 def loaded_area(b: Balance, displacement: float) -> float:
     """Area on which the gas pushes the burden [m2], at a displacement in m."""
-    width = pressurised_width(displacement, b.hole_width, b.full_width, b.growth_distance)
+    width, _ = pressurised_plane(displacement, b.hole_width, b.full_width, b.growth_distance)
     return b.charge_length * width
 
 
-@kernel
+@inline_kernel
 def rates(
     b: Balance, venting: bool, plugged: bool, time: float, state: FloatArray, rate: FloatArray
 ) -> float:
@@ -170,7 +171,7 @@ def rates(
         The stemming is in the hole; afterwards the collar is open and the stem volume constant.
     time : float [s]
     state : array (11,)
-        SI units, in the order of the constants above.
+        SI units, in the order of the constants above; the first `CORE_SIZE` entries are read.
     rate : array (11,)
         Result.
 
@@ -179,34 +180,36 @@ def rates(
     float
         Gas pressure [Pa].
     """
-    volume = relative_volume(b, time, state)
-    p = pressure(b.isentrope, volume)
-    density = b.explosive_density / volume
-    k = slope(b.isentrope, volume)
-    area = loaded_area(b, state[DISPLACEMENT])
-    storing = b.storage_volume / b.storage_time * np.exp(-time / b.storage_time)
+    emptiness = np.exp(-time / b.storage_time)
+    width, section = pressurised_plane(
+        state[DISPLACEMENT], b.hole_width, b.full_width, b.growth_distance
+    )
+    volume = _relative_volume(b, emptiness, section, state)
+    p, k, gas_energy = gas_state(b.isentrope, volume)
+    outflow = gas_outflow(p, b.explosive_density / volume, k)
+    area = b.charge_length * width
 
     through_fractures = 0.0
     if venting:
         opening = b.initial_aperture + b.opening_ratio * state[DISPLACEMENT]
         flux = fracture_flux(
-            p, density, k, opening / b.fracture_count, b.path, b.friction_factor, b.viscosity
+            outflow, opening / b.fracture_count, b.path, b.friction_factor, b.viscosity
         )
         through_fractures = opening * b.charge_length * flux
     if plugged:
         moved = state[PLUG_DISPLACEMENT]
         push = stemming_acceleration(p, moved, b.stemming_length, b.wall_rate, b.stemming_density)
-        inside = b.stemming_length - moved
-        collar_flux = leakage_flux(p, density, k, inside, b.porosity, b.grain_size)
+        collar_flux = leakage_flux(outflow, b.stemming_length - moved, b.porosity, b.grain_size)
         plug_velocity = state[PLUG_VELOCITY]
     else:
         push = 0.0
-        collar_flux = b.collar_discharge * nozzle_flux(p, density, k)
+        collar_flux = b.collar_discharge * outflow.nozzle_flux
         plug_velocity = 0.0
     through_collar = b.hole_area * collar_flux
-    enthalpy = (energy(b.isentrope, volume) + p * volume) / b.explosive_density
+    vented = through_fractures + through_collar
+    enthalpy = (gas_energy + p * volume) / b.explosive_density
 
-    rate[GAS_MASS] = -(through_fractures + through_collar)
+    rate[GAS_MASS] = -vented
     rate[DISPLACEMENT] = state[VELOCITY]
     rate[VELOCITY] = ((p - ATMOSPHERIC_PRESSURE) * area - b.friction_force) / b.burden_mass
     rate[PLUG_DISPLACEMENT] = plug_velocity
@@ -214,7 +217,7 @@ def rates(
     rate[FRACTURE_MASS] = through_fractures
     rate[COLLAR_MASS] = through_collar
     rate[BURDEN_WORK] = p * area * state[VELOCITY]
-    rate[FRACTURE_WORK] = p * storing
+    rate[FRACTURE_WORK] = p * b.storage_volume / b.storage_time * emptiness
     rate[PLUG_WORK] = p * b.hole_area * plug_velocity
-    rate[VENTED_ENTHALPY] = enthalpy * (through_fractures + through_collar)
+    rate[VENTED_ENTHALPY] = enthalpy * vented
     return p

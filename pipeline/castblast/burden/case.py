@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
 
 from castblast.explosive.isentrope import FloatArray
+
+IntArray: TypeAlias = NDArray[np.int64]
 
 
 class BurdenGeometry(NamedTuple):
@@ -91,6 +96,47 @@ class BurdenParameters(NamedTuple):
     floor_friction: float
 
 
+class BurdenColumns(NamedTuple):
+    """Many cases: the fields of `BurdenGeometry` and `BurdenParameters` as columns of n rows.
+
+    Attributes
+    ----------
+    explosive : int array (n,)
+        Index into the explosives of the batch.
+    expanded_hole_radius : array (n,) [m]
+        Hole radius at the end of the near field; NaN where there is none.
+    others : arrays (n,)
+        Float64 and C-contiguous, named and meant as in the records of one case.
+    """
+
+    explosive: IntArray
+    burden: FloatArray
+    spacing: FloatArray
+    bench_height: FloatArray
+    face_angle: FloatArray
+    stemming_length: FloatArray
+    charge_length: FloatArray
+    rock_density: FloatArray
+    hole_diameter: FloatArray
+    charge_diameter: FloatArray
+    pressurised_width_ratio: FloatArray
+    fracture_opening_ratio: FloatArray
+    fracture_count: FloatArray
+    fracture_friction_factor: FloatArray
+    gas_front_velocity: FloatArray
+    crack_velocity: FloatArray
+    fracture_storage_ratio: FloatArray
+    gas_viscosity: FloatArray
+    initial_aperture: FloatArray
+    stemming_wall_friction: FloatArray
+    stemming_density: FloatArray
+    stemming_porosity: FloatArray
+    stemming_grain_ratio: FloatArray
+    collar_discharge_coefficient: FloatArray
+    floor_friction: FloatArray
+    expanded_hole_radius: FloatArray
+
+
 class BurdenResult(NamedTuple):
     """Outcome of the burden motion of one hole; NaN throughout if it could not run.
 
@@ -161,3 +207,32 @@ class BurdenResult(NamedTuple):
     history_pressure: FloatArray
     history_velocity: FloatArray
     history_displacement: FloatArray
+
+
+class BurdenBatch(NamedTuple):
+    """Outcome of many cases: the numbers of `BurdenResult` as columns of n rows, no histories.
+
+    `status` and `n_steps` are int64; where the status is not OK, all others are NaN.
+    """
+
+    status: IntArray
+    burden_velocity: FloatArray
+    powder_factor: FloatArray
+    venting_time: FloatArray
+    vented_fraction: FloatArray
+    collar_fraction: FloatArray
+    ejection_time: FloatArray
+    acceleration_time: FloatArray
+    acceleration_distance: FloatArray
+    motion_time: FloatArray
+    burden_kinetic_energy: FloatArray
+    fracture_work: FloatArray
+    stemming_work: FloatArray
+    vented_enthalpy: FloatArray
+    atmospheric_work: FloatArray
+    floor_work: FloatArray
+    initial_gas_energy: FloatArray
+    final_gas_energy: FloatArray
+    burden_energy_residual: FloatArray
+    mass_residual: FloatArray
+    n_steps: IntArray

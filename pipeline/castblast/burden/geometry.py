@@ -14,11 +14,15 @@ burden, and any motion that is not normal to the break-out plane.
 from __future__ import annotations
 
 from math import pi
+from typing import Final
 
 import numpy as np
 
 from castblast.burden.case import BurdenGeometry
-from castblast.kernel import kernel
+from castblast.kernel import inline_kernel, kernel
+
+#: Exponent with which spacing and twice the burden blend into the width of the break-out plane.
+BLEND: Final = 12
 
 
 @kernel
@@ -53,22 +57,33 @@ def powder_factor(geometry: BurdenGeometry, explosive_density: float) -> float:
 
 @kernel
 def breakout_width(geometry: BurdenGeometry) -> float:
-    """Full width of the break-out plane [m]: the spacing, at most twice the mean burden."""
-    return min(geometry.spacing, 2.0 * mean_burden(geometry))
+    """Full width of the break-out plane [m]: the spacing, at most twice the mean burden.
+
+    Both limits are met by the blend of Churchill & Usagi (1972), (S^-n + (2 B)^-n)^(-1/n), so
+    that the width has no kink where they meet. With n = 12 (chosen by this project) it is 5.6
+    percent below either limit there, and less than 0.12 percent below the spacing for spacings
+    up to 1.4 mean burdens.
+    """
+    single_hole = 2.0 * mean_burden(geometry)
+    narrow = min(geometry.spacing, single_hole)
+    wide = max(geometry.spacing, single_hole)
+    return float(narrow * (1.0 + (narrow / wide) ** BLEND) ** (-1.0 / BLEND))
 
 
-@kernel
-def pressurised_width(
+@inline_kernel
+def pressurised_plane(
     displacement: float, hole_width: float, full_width: float, growth_distance: float
-) -> float:
-    """Loaded width b [m] at a displacement [m], from `hole_width` to `full_width` [m]."""
-    return float(hole_width - (full_width - hole_width) * np.expm1(-displacement / growth_distance))
+) -> tuple[float, float]:
+    """Loaded width b [m] and cross-section opened behind the burden [m2], the integral of b dx.
 
-
-@kernel
-def pressurised_section(
-    displacement: float, hole_width: float, full_width: float, growth_distance: float
-) -> float:
-    """Cross-section opened behind the burden [m2]: the integral of `pressurised_width`."""
-    lag = displacement + growth_distance * np.expm1(-displacement / growth_distance)
-    return float(hole_width * displacement + (full_width - hole_width) * lag)
+    Parameters
+    ----------
+    displacement : float [m]
+    hole_width, full_width : float [m]
+        Width at the start and after the gas has filled the break-out plane.
+    growth_distance : float [m]
+    """
+    decay = np.exp(-displacement / growth_distance) - 1.0
+    width = hole_width - (full_width - hole_width) * decay
+    lag = displacement + growth_distance * decay
+    return width, hole_width * displacement + (full_width - hole_width) * lag

@@ -1,4 +1,4 @@
-"""Explicit adaptive integration of the burden motion: Dormand & Prince (1980), order 5(4).
+"""Explicit adaptive integration of the burden motion, with steps that end on its switches.
 
 The right-hand side jumps where venting starts and where the stemming leaves the hole. Steps end
 exactly on these times, and on the time at which the gas stops pushing, so that the result is a
@@ -10,230 +10,164 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from castblast.burden.balance import (
-    DISPLACEMENT,
-    PLUG_DISPLACEMENT,
-    STATE_SIZE,
-    Balance,
-    loaded_area,
-    rates,
+from castblast.burden.balance import CORE_SIZE, Balance, rates
+from castblast.burden.runge_kutta import (
+    CHOKE,
+    EJECTION,
+    END_OF_PUSH,
+    EVENT_TOLERANCE,
+    NO_EVENT,
+    STEMMING_HOLDS,
+    SWITCHES,
+    Phase,
+    Work,
+    event_value,
+    step_to_event,
+    take_step,
 )
-from castblast.burden.venting import ATMOSPHERIC_PRESSURE
 from castblast.errors import Status
 from castblast.explosive.isentrope import FloatArray
-from castblast.kernel import kernel
+from castblast.kernel import kernel, lean_kernel
 
 MAX_STEPS: Final = 6000
-_RELATIVE_TOLERANCE: Final = 1e-9
-#: Tolerance in units of the natural scale of each state, for states that start at zero.
-_ABSOLUTE_TOLERANCE: Final = 1e-11
-#: The run ends at this pressure over the open air, where acceleration has all but ended.
-_END_PRESSURE: Final = 1.01 * ATMOSPHERIC_PRESSURE
-_EVENT_TOLERANCE: Final = 1e-12
-
-_NODES = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0])
-_STAGES = np.array(
-    [
-        [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-        [1 / 5, 0.0, 0.0, 0.0, 0.0, 0.0],
-        [3 / 40, 9 / 40, 0.0, 0.0, 0.0, 0.0],
-        [44 / 45, -56 / 15, 32 / 9, 0.0, 0.0, 0.0],
-        [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0.0, 0.0],
-        [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0.0],
-        [35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
-    ]
-)
-#: Fifth-order less fourth-order weights.
-_ERROR = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
+#: A trial step with a greater error over the tolerance says nothing of events.
+_WORTH_LOCATING: Final = 1e3
+#: First step after an event over the step that was tried when it came.
+_RESTART: Final = 0.7
 
 
 class Path(NamedTuple):
-    """Path of the integrator.
-
-    Where the right-hand side jumps, one time appears twice, with the rates before and after.
+    """Accepted points of the integrator, reused from case to case.
 
     Attributes
     ----------
     times : array (n,) [s]
-    states, slopes : arrays (n, 11)
-        State and its time derivative, SI units.
+    states : array (n, 5)
+        SI units, without the integrals of the ledger.
+    phases : bool array (n, 2)
+        Venting and plugged, in the step that starts at the point.
     """
 
     times: FloatArray
     states: FloatArray
-    slopes: FloatArray
-
-
-class _Work(NamedTuple):
-    """Arrays of the integrator: states at both ends of a step, rates of its stages, scales."""
-
-    state: FloatArray
-    new_state: FloatArray
-    stages: FloatArray
-    scale: FloatArray
+    phases: NDArray[np.bool_]
 
 
 @kernel
-def _step(
-    b: Balance, venting: bool, plugged: bool, time: float, step: float, work: _Work
-) -> tuple[float, float]:
-    """Take one step; `stages[0]` holds the rate at its start, `stages[6]` the one at its end.
-
-    Returns the error over the tolerance and the gas pressure at the end.
-    """
-    p = 0.0
-    for stage in range(1, 7):
-        for i in range(STATE_SIZE):
-            increment = 0.0
-            for earlier in range(stage):
-                increment += _STAGES[stage, earlier] * work.stages[earlier, i]
-            work.new_state[i] = work.state[i] + step * increment
-        stage_time = time + _NODES[stage] * step
-        p = rates(b, venting, plugged, stage_time, work.new_state, work.stages[stage])
-    worst = 0.0
-    for i in range(STATE_SIZE):
-        error = 0.0
-        for stage in range(7):
-            error += _ERROR[stage] * work.stages[stage, i]
-        size = max(abs(work.state[i]), abs(work.new_state[i]))
-        allowed = _RELATIVE_TOLERANCE * size + _ABSOLUTE_TOLERANCE * work.scale[i]
-        ratio = abs(step * error) / allowed
-        if not ratio <= worst:  # also true for NaN
-            worst = ratio
-    return worst, p
+def make_path() -> Path:
+    """Make room for the longest path."""
+    return Path(
+        np.empty(MAX_STEPS + 1),
+        np.empty((MAX_STEPS + 1, CORE_SIZE)),
+        np.empty((MAX_STEPS + 1, 2), dtype=np.bool_),
+    )
 
 
 @kernel
-def _event_value(b: Balance, ejection: bool, p: float, state: FloatArray) -> float:
-    """Share of an event still to come: 0 where it happens, negative beyond.
-
-    Ejection: stemming in the hole over its length. Otherwise the end of the run: force that still
-    drives the burden over the force of the open air.
-    """
-    if ejection:
-        return float(1.0 - state[PLUG_DISPLACEMENT] / b.stemming_length)
-    area = loaded_area(b, state[DISPLACEMENT])
-    force = (p - _END_PRESSURE) * area - b.friction_force
-    return force / (ATMOSPHERIC_PRESSURE * area)
-
-
-@kernel
-def _locate(
-    b: Balance,
-    ejection: bool,
-    venting: bool,
-    plugged: bool,
-    time: float,
-    step: float,
-    before: float,
-    after: float,
-    work: _Work,
-) -> float:
-    """Shorten a step so that it ends on an event, by the Illinois rule (Dowell & Jarratt 1971).
-
-    `before` and `after` are the event values at the ends of the full step, of opposite sign.
-    """
-    low, high = 0.0, step
-    trial = step
-    side = 0
-    for _ in range(100):
-        trial = low + (high - low) * before / (before - after)
-        _, p = _step(b, venting, plugged, time, trial, work)
-        value = _event_value(b, ejection, p, work.new_state)
-        if abs(value) <= _EVENT_TOLERANCE or high - low <= _EVENT_TOLERANCE * step:
-            break
-        if value < 0.0:
-            high, after = trial, value
-            before *= 0.5 if side < 0 else 1.0
-            side = -1
-        else:
-            low, before = trial, value
-            after *= 0.5 if side > 0 else 1.0
-            side = 1
-    return trial
-
-
-@kernel
-def _record(path: Path, point: int, time: float, work: _Work) -> int:
-    """Write the start of the next step into the path; return the next free row."""
+def _record(path: Path, point: int, phase: Phase, time: float, state: FloatArray) -> None:
     path.times[point] = time
-    path.states[point] = work.state
-    path.slopes[point] = work.stages[0]
-    return point + 1
+    path.states[point] = state[:CORE_SIZE]
+    path.phases[point, 0] = phase.venting
+    path.phases[point, 1] = phase.plugged
+
+
+@lean_kernel
+def _end_on_first_event(
+    b: Balance, phase: Phase, sides: FloatArray, time: float, step: float, error: float, work: Work
+) -> tuple[int, float, float]:
+    """Shorten a step that passes events so that it ends on the first of them.
+
+    Returns the event, the length of the step [s] and its error over the tolerance.
+    """
+    first = NO_EVENT
+    for event in range(SWITCHES):
+        if not phase.plugged and event in (EJECTION, STEMMING_HOLDS):
+            continue
+        # An event located earlier in this loop has shortened the step.
+        if event_value(b, event, sides[event], time + step, work.new_state) <= 0.0:
+            step, error = step_to_event(b, phase, event, sides[event], time, step, work)
+            first = event
+    return first, step, error
 
 
 @kernel
-def integrate(
-    b: Balance, state: FloatArray, scale: FloatArray, time_limit: float, path: Path
-) -> tuple[int, int, int, float]:
+def _sides(b: Balance, state: FloatArray) -> FloatArray:
+    """On which side of each switch a run starts, array (4,): 1, or -1 where it is behind."""
+    sides = np.ones(SWITCHES)
+    for event in (CHOKE, STEMMING_HOLDS):
+        if event_value(b, event, 1.0, 0.0, state) < 0.0:
+            sides[event] = -1.0
+    return sides
+
+
+@kernel
+def integrate(b: Balance, time_limit: float, work: Work, path: Path) -> tuple[int, int, float]:
     """Integrate until the gas stops pushing the burden faster.
 
     Parameters
     ----------
     b : Balance
-    state : array (11,)
-        State at time zero; overwritten.
-    scale : array (11,)
-        Natural size of each state.
     time_limit : float [s]
         Without an end by then the run has not converged.
+    work : Work
+        With the state at time zero, which becomes the one at the end, and its scale.
     path : Path
         Filled from row 0.
 
     Returns
     -------
-    status, points, steps : int
-        Outcome, used rows of the path, accepted steps.
+    status, steps : int
+        Outcome and accepted steps; the end of the path is its row `steps`.
     ejection_time : float [s]
         inf if the stemming stays.
     """
-    work = _Work(state, np.zeros(STATE_SIZE), np.zeros((7, STATE_SIZE)), scale)
-    venting = False
-    plugged = b.stemming_length > 0.0
-    ejection_time = np.inf if plugged else 0.0
-    time, steps = 0.0, 0
-    p = rates(b, venting, plugged, time, state, work.stages[0])
-    points = _record(path, 0, time, work)
-    drive = _event_value(b, False, p, state)
-    step = 1e-4 / np.max(np.abs(work.stages[0]) / (np.abs(state) + scale))
-    while drive > _EVENT_TOLERANCE:
-        if points + 2 > path.times.size or time >= time_limit:
-            return Status.NOT_CONVERGED.value, points, steps, ejection_time
+    phase = Phase(False, b.stemming_length > 0.0)
+    ejection_time = np.inf if phase.plugged else 0.0
+    time, steps, event = 0.0, 0, NO_EVENT
+    rates(b, phase.venting, phase.plugged, time, work.state, work.stages[0])
+    if event_value(b, END_OF_PUSH, 1.0, time, work.state) <= EVENT_TOLERANCE:
+        event = END_OF_PUSH
+    sides = _sides(b, work.state)
+    step = 1e-2 / np.max(np.abs(work.stages[0]) / (np.abs(work.state) + work.scale))
+    _record(path, 0, phase, time, work.state)
+    last_length, last_error, rejected = 0.0, 1.0, False
+    while event != END_OF_PUSH:
+        if steps == MAX_STEPS or time >= time_limit:
+            return Status.NOT_CONVERGED.value, steps, ejection_time
         to_venting = b.venting_time - time
-        starts = not venting and step >= to_venting
-        length = to_venting if starts else step
-        error, p = _step(b, venting, plugged, time, length, work)
+        starts = not phase.venting and step >= to_venting
+        tried = to_venting if starts else step
+        length, event = tried, NO_EVENT
+        error = take_step(b, phase, time, length, work)
+        if error < _WORTH_LOCATING:
+            event, length, error = _end_on_first_event(b, phase, sides, time, tried, error, work)
         if not error <= 1.0:
-            step = length * (max(0.2, 0.9 * error**-0.2) if error < np.inf else 0.1)
+            step = length * (max(0.2, 0.9 * error**-0.125) if error < np.inf else 0.1)
             if not step > 1e-16 * time_limit:
-                return Status.UNSTABLE_STEP.value, points, steps, ejection_time
+                return Status.UNSTABLE_STEP.value, steps, ejection_time
+            event, rejected = NO_EVENT, True
             continue
-        step = length * min(5.0, 0.9 * max(error, 1e-10) ** -0.2)
-        # The earlier of two events in one step wins: the end of the run is located first.
-        new_drive = _event_value(b, False, p, work.new_state)
-        if new_drive < 0.0:
-            starts = False
-            length = _locate(b, False, venting, plugged, time, length, drive, new_drive, work)
-            new_drive = 0.0
-        after = _event_value(b, True, p, work.new_state) if plugged else 1.0
-        ejected = after <= 0.0
-        if ejected:
-            starts = False
-            before = _event_value(b, True, p, state)
-            length = _locate(b, True, venting, plugged, time, length, before, after, work)
-            ejection_time = time + length
+        starts = starts and event == NO_EVENT
         time = b.venting_time if starts else time + length
         steps += 1
-        state[:] = work.new_state
-        work.stages[0] = work.stages[6]
-        drive = new_drive
-        points = _record(path, points, time, work)
-        if ejected or starts:
-            venting = venting or starts
-            plugged = plugged and not ejected
-            p = rates(b, venting, plugged, time, state, work.stages[0])
-            drive = _event_value(b, False, p, state)
-            points = _record(path, points, time, work)
-            step = min(step, length)
-    return Status.OK.value, points, steps, ejection_time
+        work.state[:] = work.new_state
+        if starts or event != NO_EVENT:
+            step, last_length = _RESTART * step, 0.0
+            if event == EJECTION:
+                ejection_time = time
+            elif event != NO_EVENT:
+                sides[event] = -sides[event]
+            phase = Phase(phase.venting or starts, phase.plugged and event != EJECTION)
+        else:
+            error = max(error, 1e-8)
+            growth = 0.9 * error**-0.125
+            # Predictive control (Gustafsson 1994): goes on shrinking where steps have to shrink.
+            growth = min(growth, growth * length / last_length * (last_error / error) ** 0.125)
+            step = length * max(0.2, min(growth, 1.0 if rejected else 6.0))
+            last_length, last_error = length, error
+        rejected = False
+        rates(b, phase.venting, phase.plugged, time, work.state, work.stages[0])
+        _record(path, steps, phase, time, work.state)
+    return Status.OK.value, steps, ejection_time

@@ -13,11 +13,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from castblast.burden.venting import ATMOSPHERIC_PRESSURE, friction_integral, nozzle_flux
-from castblast.kernel import kernel
+from castblast.burden.venting import ATMOSPHERIC_PRESSURE, Outflow
+from castblast.kernel import inline_kernel
 
 
-@kernel
+@inline_kernel
 def stemming_acceleration(
     pressure: float, displacement: float, length: float, wall_rate: float, density: float
 ) -> float:
@@ -35,27 +35,26 @@ def stemming_acceleration(
     """
     inside = length - displacement
     lock = wall_rate * inside
-    moving_length = displacement
-    moving_length += -np.expm1(-lock) / wall_rate if abs(lock) > 1e-12 else inside
-    push = pressure * np.exp(-lock) - ATMOSPHERIC_PRESSURE
+    loss = -np.expm1(-lock)  # share of the gas pressure that the wall carries
+    moving_length = displacement + (loss / wall_rate if abs(lock) > 1e-12 else inside)
+    push = pressure * (1.0 - loss) - ATMOSPHERIC_PRESSURE
     return float(max(push, 0.0) / (density * moving_length))
 
 
-@kernel
-def leakage_flux(
-    pressure: float,
-    gas_density: float,
-    exponent: float,
-    inside: float,
-    porosity: float,
-    grain_size: float,
-) -> float:
+@inline_kernel
+def push_margin(pressure: float, displacement: float, length: float, wall_rate: float) -> float:
+    """Positive while the gas pushes the stemming, negative while wall friction holds it [-]."""
+    return float(np.log(pressure / ATMOSPHERIC_PRESSURE) - wall_rate * (length - displacement))
+
+
+@inline_kernel
+def leakage_flux(outflow: Outflow, inside: float, porosity: float, grain_size: float) -> float:
     """Gas flux through stemming in place [kg m-2 s-1], per cross-section of the hole.
 
     Parameters
     ----------
-    pressure, gas_density, exponent : float
-        Gas state as in `venting.nozzle_flux`.
+    outflow : Outflow
+        Of the gas in the hole.
     inside : float [m]
         Length of the column still in the hole.
     porosity : float [-]
@@ -66,9 +65,8 @@ def leakage_flux(
     Inertial term of Ergun (1952): -dP/dy = beta G^2 / rho, beta = 1.75 (1 - n) / (n^3 d_s), in
     series with the nozzle of the pore section n G0.
     """
-    if pressure <= ATMOSPHERIC_PRESSURE or porosity <= 0.0:
+    if outflow.nozzle_flux <= 0.0 or porosity <= 0.0:
         return 0.0
     resistance = 1.75 * (1.0 - porosity) / (porosity**3 * grain_size) * max(inside, 0.0)
-    pore_flux = porosity * nozzle_flux(pressure, gas_density, exponent)
-    drop = friction_integral(pressure, gas_density, exponent)
-    return float(1.0 / np.sqrt(1.0 / pore_flux**2 + resistance / drop))
+    pore_flux = porosity * outflow.nozzle_flux
+    return float(1.0 / np.sqrt(1.0 / pore_flux**2 + resistance / outflow.friction_integral))
