@@ -10,6 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from castblast.burden.batch import BurdenColumns, solve_burden_motions
 from castblast.burden.case import BurdenGeometry, BurdenParameters, BurdenResult
 from castblast.burden.motion import solve_burden_motion
 from castblast.errors import Status
@@ -522,6 +523,72 @@ def test_result_is_smooth_in_the_inputs() -> None:
     gone = [np.isfinite(result.ejection_time) for result in results]
     assert any(gone)
     assert not all(gone)
+
+
+def sharpness(y: np.ndarray) -> float:
+    """Largest fourth difference of a curve, over that of every eighth of its points.
+
+    About 8^-4 for a smooth curve and 8^-2 where the second derivative jumps, but 1/32 to 1/2 for
+    a kink, depending on where it lies between points. Below 1e-8 of the range there is only
+    noise.
+    """
+    fine, coarse = (np.abs(np.diff(values, 4)).max() for values in (y, y[::8]))
+    floor = 1e-8 * np.ptp(y)
+    return float(max(fine, floor) / max(coarse, 8.0 * 8.0 * floor))
+
+
+def test_sharpness_finds_a_kink_of_a_tenth_of_a_percent() -> None:
+    """A slope that changes by 0.1 percent at any place between the points; and none at all."""
+    x = np.linspace(0.0, 1.0, 199 * 8 + 1)
+    assert sharpness(np.exp(x)) < 0.02
+    for place in 0.5 + np.linspace(0.0, 1.0, 33) / 199:
+        assert sharpness(np.exp(x) + 2e-3 * np.abs(x - place)) > 0.025
+
+
+SWEEPS = {
+    "burden": (1.5, 8.0),
+    "spacing": (2.0, 14.0),  # beyond twice the burden: from a row of holes to a single one
+    "bench_height": (6.0, 30.0),
+    "face_angle": (pi / 3, pi / 2),
+    "stemming_length": (0.1, 4.5),
+    "rock_density": (1800.0, 3000.0),
+    "hole_diameter": (0.08, 0.3),
+    "expansion": (1.4, 2.8),
+    "gas_front_velocity": (50.0, 2000.0),
+    "fracture_opening_ratio": (0.1, 3.0),  # towards 0 as its power 1.5: rough narrow fractures
+    "fracture_storage_ratio": (0.0, 3.0),
+    "stemming_wall_friction": (0.0, 0.3),
+}
+
+
+def sweep(name: str, parameter_set: str, diameter: float, points: int) -> np.ndarray:
+    """Velocity of a bench of 3 m burden along one input, the others held."""
+    values = parameters(parameter_set)._asdict() | {
+        "burden": 3.0, "spacing": 3.5, "bench_height": 12.0, "face_angle": 1.3,
+        "stemming_length": 2.1, "rock_density": 2600.0, "hole_diameter": diameter,
+        "expansion": 1.8,
+    }  # fmt: skip
+    columns = {key: np.full(points, value) for key, value in values.items()}
+    columns[name] = np.linspace(*SWEEPS[name], points)
+    columns["charge_length"] = columns["bench_height"] - columns["stemming_length"]
+    columns["charge_diameter"] = columns["hole_diameter"]
+    columns["expanded_hole_radius"] = 0.5 * columns.pop("expansion") * columns["hole_diameter"]
+    cases = BurdenColumns(explosive=np.zeros(points, dtype=np.int64), **columns)
+    batch = solve_burden_motions([explosive()], cases)
+    assert np.all(batch.status == Status.OK)
+    return batch.burden_velocity
+
+
+@pytest.mark.parametrize("name", SWEEPS)
+def test_velocity_has_no_kink_along_any_input(name: str) -> None:
+    """200 points along an input, then 8 times as many: no jump of the first derivative.
+
+    The sweeps pass choked and unchoked outflow, stemming that holds, moves, leaves the hole
+    before or after venting starts, venting after the end of the push, and spacings beyond twice
+    the burden. The stemming of the 250 mm hole is short for it and leaves.
+    """
+    for parameter_set, diameter in (("field", 0.102), ("authors", 0.25)):
+        assert sharpness(sweep(name, parameter_set, diameter, 199 * 8 + 1)) < 0.025
 
 
 @pytest.mark.parametrize("last_volume", [700.0, 42.0])
