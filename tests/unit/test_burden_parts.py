@@ -8,6 +8,13 @@ import numpy as np
 import pytest
 
 from castblast.burden.case import BurdenGeometry, BurdenParameters
+from castblast.burden.dop853 import (
+    FIFTH_ORDER_ERROR,
+    NODES,
+    STAGES,
+    THIRD_ORDER_ERROR,
+    WEIGHTS,
+)
 from castblast.burden.geometry import (
     breakout_width,
     burden_mass,
@@ -192,6 +199,25 @@ def test_leakage_is_ergun_for_long_and_pores_for_short_columns() -> None:
     assert long == pytest.approx(sqrt(friction_integral(*STATE) / (beta * 1e4)), rel=1e-4)
     assert leakage_flux(DENSE, 0.0, 0.4, 0.01) == pytest.approx(0.4 * nozzle_flux(*STATE))
     assert leakage_flux(DENSE, 2.0, 0.0, 0.01) == 0.0
+
+
+def test_coefficients_of_the_integrator_meet_its_order() -> None:
+    """Conditions of quadrature up to order 8 (Butcher 1963), and of its error formulas 5 and 3.
+
+    Sum of b_i c_i^q = 1 / (q + 1), row sums of a_ij = c_i, and the condition of order 8 that
+    chains seven stages, b A^6 c = 1 / 8!.
+    """
+    assert STAGES.sum(axis=1) == pytest.approx(NODES, abs=1e-14)
+    for q in range(8):
+        assert WEIGHTS @ NODES**q == pytest.approx(1 / (q + 1), rel=1e-13)
+    assert abs(WEIGHTS @ NODES**8 - 1 / 9) > 1e-9
+    for q in range(5):
+        assert FIFTH_ORDER_ERROR @ NODES**q == pytest.approx(0.0, abs=1e-14)
+    for q in range(3):
+        assert THIRD_ORDER_ERROR @ NODES**q == pytest.approx(0.0, abs=1e-14)
+    square = np.column_stack([STAGES, np.zeros(NODES.size)])
+    chain = WEIGHTS @ np.linalg.matrix_power(square, 6) @ NODES
+    assert chain == pytest.approx(1 / 40320, rel=1e-10)
 
 
 @pytest.mark.parametrize(
