@@ -9,20 +9,34 @@ uniaxial compressive and tensile strength here, nowhere else.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from math import nan
 from typing import Any, NamedTuple, TypeVar
 
-from castblast.burden.case import BurdenGeometry, BurdenParameters, BurdenResult
+import numpy as np
+from numpy.typing import NDArray
+
+from castblast.burden.batch import BurdenBatch, solve_burden_motions
+from castblast.burden.case import BurdenColumns, BurdenGeometry, BurdenParameters, BurdenResult
 from castblast.burden.motion import no_burden_motion, solve_burden_motion
 from castblast.errors import Status
 from castblast.explosive.isentrope import Explosive, FloatArray
-from castblast.inputs import resolve_inputs
-from castblast.nearfield.case import EndMode, Hole, NearFieldSettings, Rock, TensionMode
+from castblast.inputs import InputColumns, IntArray, resolve_columns, resolve_inputs
+from castblast.nearfield.batch import NearFieldBatch, solve_near_fields
+from castblast.nearfield.case import (
+    EndMode,
+    Hole,
+    NearFieldColumns,
+    NearFieldSettings,
+    Rock,
+    TensionMode,
+)
 from castblast.nearfield.solver import NearFieldResult, solve_near_field
 from castblast.variables import OUTPUT_NAMES
 
 _Value = TypeVar("_Value", float, FloatArray)
+#: Inputs that set up the near-field mesh: rows that share them are solved together.
+_SOLVER_INPUTS = ("outer_radius", "zones", "quadratic_viscosity", "linear_viscosity")
 
 
 class BlastSettings(NamedTuple):
@@ -73,6 +87,23 @@ class BlastResult(NamedTuple):
     burden: BurdenResult
 
 
+class BlastBatch(NamedTuple):
+    """Outcome of n blasts.
+
+    Attributes
+    ----------
+    status : (n,) int8
+        Of the first part that failed, else OK.
+    near_field : NearFieldBatch
+    burden : BurdenBatch
+        NaN where the near field failed.
+    """
+
+    status: NDArray[np.int8]
+    near_field: NearFieldBatch
+    burden: BurdenBatch
+
+
 def make_case(
     explosive: Explosive,
     values: Mapping[str, float],
@@ -121,6 +152,58 @@ def result_values(result: BlastResult) -> dict[str, float]:
     }
 
 
+def run_blasts(
+    explosives: Sequence[Explosive],
+    explosive: IntArray,
+    values: InputColumns,
+    settings: BlastSettings = BlastSettings(),  # noqa: B008  (immutable)
+) -> BlastBatch:
+    """Run n blasts; a row does not depend on the others.
+
+    Parameters
+    ----------
+    explosives : sequence of Explosive
+    explosive : (n,) int
+        Index into `explosives`.
+    values : mapping
+        Input names to SI values, resolved or not.
+    settings : BlastSettings
+
+    Raises
+    ------
+    SpecError
+        As `inputs.resolve_columns`; on physics never, a failure is in the status of its row.
+    """
+    full = resolve_columns(values, explosives, explosive, settings.parameter_set)
+    index = np.array(explosive, dtype=np.int64)
+    # Plain copies, as kernels are compiled for writable, contiguous columns only.
+    columns = {name: np.array(column) for name, column in full.items()}
+    holes = NearFieldColumns(explosive=index, **_rock_and_hole(columns))
+    parts = [
+        (rows, solve_near_fields(explosives, _take(holes, rows), near_field))
+        for near_field, rows in _solver_groups(columns, settings)
+    ]
+    near = _gather(parts, len(index))
+    solved = near.status == Status.OK
+    radius = np.where(solved, near.expanded_hole_radius, nan)
+    shared = (*BurdenGeometry._fields, *BurdenParameters._fields)
+    burden = solve_burden_motions(
+        explosives,
+        BurdenColumns(
+            explosive=index, expanded_hole_radius=radius, **{name: columns[name] for name in shared}
+        ),
+    )
+    burden = burden._replace(status=np.where(solved, burden.status, near.status))
+    return BlastBatch(burden.status.astype(np.int8), near, burden)
+
+
+def batch_values(batch: BlastBatch) -> dict[str, FloatArray]:
+    """Every output of `variables.OUTPUTS` by name, (n,), SI; NaN in rows that failed."""
+    finished = batch.status == Status.OK
+    outputs = _outputs(batch.near_field, batch.burden)
+    return {name: np.where(finished, values, nan) for name, values in outputs.items()}
+
+
 def _rock_and_hole(full: Mapping[str, _Value]) -> dict[str, _Value]:
     """Fields of `Rock` and `Hole` from resolved inputs, for one blast or columns of many."""
     factor = full["strength_rate_factor"]
@@ -149,6 +232,31 @@ def _near_field_settings(solver: Mapping[str, float], settings: BlastSettings) -
         linear_viscosity=solver["linear_viscosity"],
         history_points=settings.history_points,
     )
+
+
+def _solver_groups(
+    full: Mapping[str, FloatArray], settings: BlastSettings
+) -> Iterator[tuple[NearFieldSettings, NDArray[np.intp]]]:
+    """Rows (m,) that are solved with the same settings of the near field, and these settings."""
+    table = np.array([full[name] for name in _SOLVER_INPUTS])
+    kinds, kind = np.unique(table, axis=1, return_inverse=True)
+    for number, values in enumerate(kinds.T.tolist()):
+        solver = dict(zip(_SOLVER_INPUTS, values, strict=True))
+        yield _near_field_settings(solver, settings), np.flatnonzero(kind.ravel() == number)
+
+
+def _take(columns: NearFieldColumns, rows: NDArray[np.intp]) -> NearFieldColumns:
+    return NearFieldColumns._make(column[rows] for column in columns)
+
+
+def _gather(parts: Sequence[tuple[NDArray[np.intp], NearFieldBatch]], count: int) -> NearFieldBatch:
+    """Put results back into the order of their rows, `count` in all."""
+    first = parts[0][1]
+    whole = [np.empty((count, *column.shape[1:]), dtype=column.dtype) for column in first]
+    for rows, part in parts:
+        for target, column in zip(whole, part, strict=True):
+            target[rows] = column
+    return NearFieldBatch._make(whole)
 
 
 def _outputs(near_field: Any, burden: Any) -> dict[str, Any]:

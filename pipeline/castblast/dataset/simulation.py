@@ -1,8 +1,7 @@
 """What a build asks of the physics: complete a design, refuse it, simulate a batch of rows.
 
 `Simulator` is the whole interface, over columns of equal length, so that a build knows nothing of
-blasting and a solver that advances many rows in lockstep fits in the same place. `BlastSimulator`
-is the real one: it runs `castblast.blast` row by row.
+blasting. `BlastSimulator` is the real one: `castblast.blast`, which advances many rows in lockstep.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from typing import NamedTuple, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.blast import BlastSettings, make_case, result_values, run_blast
+from castblast.blast import BlastSettings, batch_values, run_blasts
 from castblast.errors import Status
 from castblast.explosive.isentrope import Explosive
 from castblast.inputs import (
@@ -84,7 +83,7 @@ class Simulator(Protocol):
 
 @dataclass(frozen=True)
 class BlastSimulator:
-    """Near field and burden motion of `castblast.blast`, row by row.
+    """Near field and burden motion of `castblast.blast`.
 
     Attributes
     ----------
@@ -123,22 +122,14 @@ class BlastSimulator:
         return resolve_columns(values, self.explosives, explosive, self.settings.parameter_set)
 
     def run(self, inputs: Columns, explosive: IntArray) -> BatchResult:
-        """Simulate resolved rows one after the other."""
-        count = len(explosive)
-        status = np.empty(count, dtype=np.int8)
-        outputs = {name: np.full(count, np.nan) for name in OUTPUT_NAMES}
+        """Simulate resolved rows in lockstep by `blast.run_blasts`."""
+        batch = run_blasts(self.explosives, explosive, inputs, self.settings)
+        finished = (batch.status == Status.OK)[:, np.newaxis]
         histories = {
-            name: np.full((count, self.settings.history_points), np.nan) for name in HISTORY_NAMES
+            name: np.where(finished, getattr(batch.near_field, name), np.nan)
+            for name in HISTORY_NAMES
         }
-        for i, (row, index) in enumerate(zip(_rows(inputs), explosive, strict=True)):
-            result = run_blast(make_case(self.explosives[index], row, self.settings))
-            status[i] = result.status
-            for name, value in result_values(result).items():
-                outputs[name][i] = value
-            if result.status == Status.OK:
-                for name in HISTORY_NAMES:
-                    histories[name][i] = getattr(result.near_field, name)
-        return BatchResult(status, outputs, histories)
+        return BatchResult(batch.status, batch_values(batch), histories)
 
     def _faults(self, columns: Columns) -> list[FaultyRows]:
         return design_fault_columns(columns, _count(columns))
@@ -169,9 +160,3 @@ def fault_kind(fault: str) -> str:
 
 def _count(columns: Columns) -> int:
     return len(next(iter(columns.values())))
-
-
-def _rows(columns: Columns) -> list[dict[str, float]]:
-    names = list(columns)
-    table = zip(*(columns[name].tolist() for name in names), strict=True)
-    return [dict(zip(names, row, strict=True)) for row in table]
