@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.burden.balance import CORE_SIZE, Balance, rates
+from castblast.burden.balance import CORE_SIZE, STATE_SIZE, Balance, rates
 from castblast.burden.runge_kutta import (
     CHOKE,
     EJECTION,
@@ -65,17 +65,18 @@ def make_path() -> Path:
     )
 
 
-@kernel
+@lean_kernel
 def _record(path: Path, point: int, phase: Phase, time: float, state: FloatArray) -> None:
     path.times[point] = time
-    path.states[point] = state[:CORE_SIZE]
+    for i in range(CORE_SIZE):
+        path.states[point, i] = state[i]
     path.phases[point, 0] = phase.venting
     path.phases[point, 1] = phase.plugged
 
 
 @lean_kernel
 def _end_on_first_event(
-    b: Balance, phase: Phase, sides: FloatArray, time: float, step: float, error: float, work: Work
+    b: Balance, phase: Phase, time: float, step: float, error: float, work: Work
 ) -> tuple[int, float, float]:
     """Shorten a step that passes events so that it ends on the first of them.
 
@@ -86,23 +87,27 @@ def _end_on_first_event(
         if not phase.plugged and event in (EJECTION, STEMMING_HOLDS):
             continue
         # An event located earlier in this loop has shortened the step.
-        if event_value(b, event, sides[event], time + step, work.new_state) <= 0.0:
-            step, error = step_to_event(b, phase, event, sides[event], time, step, work)
+        side = work.sides[event]
+        if event_value(b, event, side, time + step, work.new_state) <= 0.0:
+            step, error = step_to_event(b, phase, event, side, time, step, work)
             first = event
     return first, step, error
 
 
-@kernel
-def _sides(b: Balance, state: FloatArray) -> FloatArray:
-    """On which side of each switch a run starts, array (4,): 1, or -1 where it is behind."""
-    sides = np.ones(SWITCHES)
-    for event in (CHOKE, STEMMING_HOLDS):
-        if event_value(b, event, 1.0, 0.0, state) < 0.0:
-            sides[event] = -1.0
-    return sides
+@lean_kernel
+def _start(b: Balance, work: Work) -> float:
+    """Note on which side of each switch the run starts; return a first step [s]."""
+    for event in range(SWITCHES):
+        behind = event_value(b, event, 1.0, 0.0, work.state) < 0.0
+        work.sides[event] = -1.0 if behind and event in (CHOKE, STEMMING_HOLDS) else 1.0
+    fastest = 0.0
+    for i in range(STATE_SIZE):
+        relative = abs(work.stages[0, i]) / (abs(work.state[i]) + work.scale[i])
+        fastest = max(fastest, relative)
+    return float(1e-2 / fastest)
 
 
-@kernel
+@lean_kernel
 def integrate(b: Balance, time_limit: float, work: Work, path: Path) -> tuple[int, int, float]:
     """Integrate until the gas stops pushing the burden faster.
 
@@ -129,8 +134,7 @@ def integrate(b: Balance, time_limit: float, work: Work, path: Path) -> tuple[in
     rates(b, phase.venting, phase.plugged, time, work.state, work.stages[0])
     if event_value(b, END_OF_PUSH, 1.0, time, work.state) <= EVENT_TOLERANCE:
         event = END_OF_PUSH
-    sides = _sides(b, work.state)
-    step = 1e-2 / np.max(np.abs(work.stages[0]) / (np.abs(work.state) + work.scale))
+    step = _start(b, work)
     _record(path, 0, phase, time, work.state)
     last_length, last_error, rejected = 0.0, 1.0, False
     while event != END_OF_PUSH:
@@ -142,7 +146,7 @@ def integrate(b: Balance, time_limit: float, work: Work, path: Path) -> tuple[in
         length, event = tried, NO_EVENT
         error = take_step(b, phase, time, length, work)
         if error < _WORTH_LOCATING:
-            event, length, error = _end_on_first_event(b, phase, sides, time, tried, error, work)
+            event, length, error = _end_on_first_event(b, phase, time, tried, error, work)
         if not error <= 1.0:
             step = length * (max(0.2, 0.9 * error**-0.125) if error < np.inf else 0.1)
             if not step > 1e-16 * time_limit:
@@ -152,13 +156,14 @@ def integrate(b: Balance, time_limit: float, work: Work, path: Path) -> tuple[in
         starts = starts and event == NO_EVENT
         time = b.venting_time if starts else time + length
         steps += 1
-        work.state[:] = work.new_state
+        for i in range(STATE_SIZE):
+            work.state[i] = work.new_state[i]
         if starts or event != NO_EVENT:
             step, last_length = _RESTART * step, 0.0
             if event == EJECTION:
                 ejection_time = time
             elif event != NO_EVENT:
-                sides[event] = -sides[event]
+                work.sides[event] = -work.sides[event]
             phase = Phase(phase.venting or starts, phase.plugged and event != EJECTION)
         else:
             error = max(error, 1e-8)

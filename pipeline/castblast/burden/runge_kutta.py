@@ -70,6 +70,8 @@ class Work(NamedTuple):
         Natural size of each state.
     combinations : array (3, 11)
         Sums over the stages for the step and its two error formulas.
+    sides : array (4,)
+        For each switch 1 before it and, where it can come back, -1 behind it.
     """
 
     state: FloatArray
@@ -77,6 +79,7 @@ class Work(NamedTuple):
     stages: FloatArray
     scale: FloatArray
     combinations: FloatArray
+    sides: FloatArray
 
 
 @kernel
@@ -88,6 +91,7 @@ def make_work() -> Work:
         np.zeros((STAGE_COUNT + 1, STATE_SIZE)),
         np.ones(STATE_SIZE),
         np.zeros((3, STATE_SIZE)),
+        np.ones(SWITCHES),
     )
 
 
