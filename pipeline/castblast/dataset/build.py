@@ -31,6 +31,7 @@ IN_FLIGHT = 3
 _CONNECT_SECONDS = 10
 _COUNT_SECONDS = 5.0
 _RETRIES = 2
+_GONE = "the scheduler went away; finished shards are kept: run the same command again to go on"
 
 
 def build_shards(
@@ -133,8 +134,7 @@ def _reports(
         elif future.status == "error":
             _result(future)
         elif client.status != "running":
-            message = "the scheduler went away; start it and run the same command again to go on"
-            raise DatasetError(message)
+            raise DatasetError(_GONE)
         elif future.status in ("lost", "cancelled"):
             submit(running[future.key])
         else:
@@ -175,6 +175,7 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[tuple[Any, C
 @contextmanager
 def _remote(scheduler: str) -> Iterator[Any]:
     from dask.distributed import Client
+    from distributed.comm import CommClosedError
 
     try:
         client = Client(scheduler, timeout=_CONNECT_SECONDS, set_as_default=False)
@@ -185,7 +186,10 @@ def _remote(scheduler: str) -> Iterator[Any]:
         if not client.nthreads():
             message = f"--scheduler {scheduler}: it has no workers"
             raise SpecError(message)
-        yield client
+        try:
+            yield client
+        except CommClosedError:
+            raise DatasetError(_GONE) from None
 
 
 @contextmanager
