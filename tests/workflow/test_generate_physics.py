@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 import yaml
+from stand_in import Cluster
 
 from castblast.dataset.schema import flag_names
 from castblast.dataset.store import open_dataset
@@ -47,6 +48,44 @@ def test_one_worker_gives_the_same_bytes(castblast, recipe, file):
     done = castblast("generate", recipe, "--size", SIZE, "--workers", 1, "--out", out, "--quiet")
     assert done.returncode == 0, done.stderr
     assert out.read_bytes() == file.read_bytes()
+
+
+def test_a_cluster_and_another_cut_into_shards_give_the_same_rows(
+    castblast, recipe, file, tmp_path
+):
+    """Two worker processes over TCP, five rows to a shard: rows do not know their neighbours."""
+    other = tmp_path / "coarse.yaml"
+    content = yaml.safe_load(recipe.read_text())
+    other.write_text(yaml.safe_dump(content | {"shard_size": 5}, sort_keys=False))
+    cluster = Cluster(tmp_path / "cluster")
+    try:
+        cluster.wait(2)
+        done = castblast(
+            "generate", other, "--size", SIZE, "--scheduler", cluster.address,
+            "--out", tmp_path, "--quiet",
+        )  # fmt: skip
+    finally:
+        cluster.close()
+    assert done.returncode == 0, done.stderr
+    done = castblast("dataset", "diff", file, tmp_path / "data.nc", "--json")
+    assert done.returncode == 0, done.stdout
+    assert json.loads(done.stdout)["same"]
+
+
+def test_an_extension_keeps_old_rows_and_is_reproduced(castblast, file, tmp_path):
+    done = castblast("dataset", "extend", file, "--add", 8, "--out", tmp_path, "--json")
+    assert done.returncode == 0, done.stderr
+    more = tmp_path / "data.nc"
+    assert json.loads(done.stdout)["id"] == "full/1.1.0"
+    done = castblast("dataset", "diff", file, more, "--json")
+    assert done.returncode == 4
+    found = json.loads(done.stdout)
+    assert found["rows"] == {"common": SIZE, "first_only": 0, "second_only": 8}
+    assert found["variables"] == {}
+    for sample in (3, SIZE + 5):
+        done = castblast("dataset", "reproduce", more, "--sample", sample, "--json")
+        assert done.returncode == 0, done.stdout
+        assert json.loads(done.stdout)["same"]
 
 
 @pytest.mark.parametrize("sample", [0, 17, SIZE - 1])
