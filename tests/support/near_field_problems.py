@@ -65,15 +65,15 @@ def annulus(
         of.young_modulus / (3.0 * (1.0 - 2.0 * of.poisson_ratio)),
         of.young_modulus / (2.0 * (1.0 + of.poisson_ratio)),
         ucs,
-        apex_tension(ucs, of.friction_angle),
+        float(apex_tension(ucs, of.friction_angle)),
         False,
         1.5,
         linear,
     )
     load = WallLoad(False, ANFO.isentrope, inner, start, target, rise)
     return Annulus(
-        material, friction_number(of.friction_angle), friction_number(of.dilation_angle), inner,
-        outer, first, zones, in_situ, quiet, load, end, 1.8, courant, 5_000_000,
+        material, float(friction_number(of.friction_angle)),
+        float(friction_number(of.dilation_angle)), inner, outer, first, np.inf, zones, in_situ, quiet, load, end, 1.8, courant, 5_000_000,
     )  # fmt: skip
 
 

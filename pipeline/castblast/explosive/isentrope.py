@@ -175,15 +175,15 @@ def jwl_pressure(
     a: float, b: float, c: float, r1: float, r2: float, omega: float, volume: float
 ) -> float:
     """JWL pressure [Pa] at a relative volume > 0; `a`, `b`, `c` in Pa."""
-    return a * np.exp(-r1 * volume) + b * np.exp(-r2 * volume) + c * volume ** (-1.0 - omega)
+    return float(a * np.exp(-r1 * volume) + b * np.exp(-r2 * volume) + c * volume ** (-1.0 - omega))
 
 
 @kernel
 def pressure(isentrope: ProductIsentrope, relative_volume: float) -> float:
     """Pressure on the isentrope [Pa] at a relative volume > 0; the table's end slopes continue."""
     if not isentrope.tabulated:
-        i = isentrope
-        return jwl_pressure(i.a, i.b, i.c, i.r1, i.r2, i.omega, relative_volume)
+        jwl = isentrope
+        return jwl_pressure(jwl.a, jwl.b, jwl.c, jwl.r1, jwl.r2, jwl.omega, relative_volume)
     x = np.log(relative_volume)
     last = isentrope.log_volume.size - 1
     if x <= isentrope.log_volume[0]:

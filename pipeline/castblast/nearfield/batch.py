@@ -32,7 +32,7 @@ class NearFieldBatch(NamedTuple):
 
     Attributes
     ----------
-    status, n_steps, return_map_fallbacks : int array (n,)
+    status, n_steps, zone_steps, return_map_fallbacks : int array (n,)
     settled : bool array (n,)
     history_time, history_pressure, history_radius : array (n, history_points) [s, Pa, m]
     equilibrium_pressure, ... : array (n,)
@@ -64,6 +64,7 @@ class NearFieldBatch(NamedTuple):
     gas_energy: FloatArray
     energy_residual: FloatArray
     n_steps: IntArray
+    zone_steps: IntArray
     return_map_fallbacks: IntArray
     history_time: FloatArray
     history_pressure: FloatArray
@@ -95,7 +96,7 @@ def solve_near_fields(
     points = np.full((count, 3, max(settings.history_points, 2)), np.nan)
     good = possible(explosives, columns, settings)
     for row in np.flatnonzero(~good):
-        no_state(int(Status.BAD_INPUT), 0, 0, states[row])
+        no_state(int(Status.BAD_INPUT), 0, 0, 0, states[row])
     if good.any():
         holes = hole_parameters(explosives, columns, settings)
         cases = Cases(
@@ -127,7 +128,7 @@ def _batch(states: FloatArray, points: FloatArray) -> NearFieldBatch:
     values: dict[str, Any] = {
         name: np.ascontiguousarray(states[:, k]) for k, name in enumerate(STATE_NAMES)
     }
-    for name in ("status", "n_steps", "return_map_fallbacks"):
+    for name in ("status", "n_steps", "zone_steps", "return_map_fallbacks"):
         values[name] = values[name].astype(np.int64)
     values["settled"] = values["settled"] == 1.0
     return NearFieldBatch(

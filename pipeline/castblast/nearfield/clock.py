@@ -7,10 +7,14 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from castblast.kernel import inline_kernel
 
 #: A step may be at most this much longer than the one before.
 STEP_GROWTH = 1.05
+#: Share of the rise time that is round-off.
+_NO_TIME = 1e-9
 
 
 class Schedule(NamedTuple):
@@ -130,6 +134,11 @@ def after_step(
         if end == 0.0:
             end = schedule.settling_factor * reversal
     following = min(STEP_GROWTH * step, schedule.courant * limit)
+    left = schedule.rise_time - time
+    if left > _NO_TIME * schedule.rise_time:
+        # A step that ran across the corner of the load would lose work by leaps: with the number
+        # of steps in the rise.
+        following = left / np.ceil(left / following)
     return Clock(time, following, step, end, reversal, speed, pressure, full)
 
 

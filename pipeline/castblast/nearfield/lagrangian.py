@@ -20,7 +20,7 @@ on logarithmic strains, whose elastic and plastic parts add because the axes nev
 
     q = rho c l C_L d + rho w^2 C_Q d^2 (only where d > 0),   d = -(volumetric strain rate)
 
-with c the p-wave speed and l = max(w, 0.04 r). The quadratic part spreads shocks. The linear part
+with c the p-wave speed and l = 0.04 r. The quadratic part spreads shocks. The linear part
 belongs to the model: with sin(phi) > 1 - 2 nu the non-associated flow is unstable without it
 (Sandler & Rubin 1987) and refinement makes the answer worse. The instability oscillates, so the
 linear part must act in expansion as well as in compression; and only with a length that does not
@@ -62,7 +62,7 @@ SHEAR, TENSION, VISCOUS, BOUNDARY, LOAD, RAMP = 0, 1, 2, 3, 4, 5
 LEDGER_SIZE = 6
 
 #: Largest strain of a zone in one step; the work of a step is right to its square.
-STRAIN_STEP = 0.01
+STRAIN_STEP = 0.0035
 
 
 class Material(NamedTuple):
@@ -134,15 +134,21 @@ class Body(NamedTuple):
 
 
 @kernel
-def graded_radii(inner: float, outer: float, zones: int, first: float) -> FloatArray:
-    """Node radii of a mesh whose zones grow by a constant factor.
+def graded_radii(inner: float, outer: float, zones: int, first: float, reach: float) -> FloatArray:
+    """Node radii of a mesh whose zones grow outwards, beyond a reach faster than within.
+
+    With y the distance from the wall and i the number of a node, dy/di = (first + g y)
+    (1 + y / reach), in closed form y = first E / (q - E first / reach) with E = exp(q i) - 1; q
+    puts the last node on the outer radius. An infinite reach makes a geometric series.
 
     Parameters
     ----------
     inner, outer : float [m]
     zones : int
     first : float [m]
-        Width of the first zone; a uniform mesh if it would not fit otherwise.
+        Width of zones at the wall; a uniform mesh if it would not fit otherwise.
+    reach : float [m]
+        Distance from the wall over which the zones stay fine; may be infinite.
 
     Returns
     -------
@@ -154,17 +160,18 @@ def graded_radii(inner: float, outer: float, zones: int, first: float) -> FloatA
         for i in range(zones + 1):
             nodes[i] = inner + length * i / zones
         return nodes
-    # Bisection for the ratio of (ratio^zones - 1) / (ratio - 1) = length / first.
-    low, high = 1.0 + 1e-12, 4.0
+    share = first / reach
+    low, high = 1e-12, 4.0
     for _ in range(100):
-        ratio = 0.5 * (low + high)
-        if np.expm1(zones * np.log(ratio)) / (ratio - 1.0) > length / first:
-            high = ratio
+        q = 0.5 * (low + high)
+        if np.expm1(q * zones) * (first + share * length) > q * length:
+            high = q
         else:
-            low = ratio
-    growth = np.log(0.5 * (low + high))
-    for i in range(zones + 1):
-        nodes[i] = inner + length * np.expm1(i * growth) / np.expm1(zones * growth)
+            low = q
+    for i in range(zones):
+        e = np.expm1(q * i)
+        nodes[i] = inner + first * e / (q - share * e)
+    nodes[zones] = outer
     return nodes
 
 
@@ -260,7 +267,7 @@ def update_zones(
         work[VISCOUS] += viscous_work(d, old_width, old_mean, viscous[j], r.viscous)
         viscous[j] = r.viscous
         limit = min(limit, r.limit)
-        fastest = max(fastest, max(abs(d.radial), abs(d.hoop)))  # noqa: PLW3301
+        fastest = max(fastest, max(abs(d.radial), abs(d.hoop)))
         force[j] += r.through - r.around
         force[j + 1] = -r.through - r.around
     return step_limit(limit, fastest, dt), fallbacks

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from castblast.explosive.packed import PackedIsentropes, packed_pressure, unpack_isentrope
-from castblast.kernel import kernel
+from castblast.kernel import inline_kernel, kernel, lean_kernel
 from castblast.nearfield.clock import (
     Clock,
     Schedule,
@@ -59,7 +59,6 @@ from castblast.nearfield.march import (
     AT_REST,
     NOT_CONVERGED,
     OK,
-    UNSTABLE,
     Annulus,
     March,
     kick_boundary,
@@ -82,15 +81,16 @@ class Lanes(NamedTuple):
     zones, rows : array
         See `castblast.nearfield.lanes`.
     edges : EdgeModels
-    case, active, steps, fallbacks, status : int array (LANES,)
-        Row of the case (-1: idle), zones in motion, steps taken, failed returns, outcome so far.
+    case, active, steps, zone_steps, fallbacks, status : int array (LANES,)
+        Row of the case (-1: idle), zones in motion, steps taken, zones in motion summed over
+        them, failed returns, outcome so far.
     finishing : bool array (LANES,)
         The step at hand is the last one.
     clock : array (LANES, 8)
         Fields of `Clock`.
     schedule : array (LANES, 4)
         Fields of `Schedule`.
-    charge_radius, inner_mass, old_radius, peak : array (LANES,) [m, kg, m, m/s]
+    charge_radius, inner_mass, outer_mass, old_radius, peak : array (LANES,) [m, kg, kg, m, m/s]
         `old_radius` is that of the wall before the step, `peak` its highest speed so far.
     work : array (LANES, 3) [J/m per radian]
         Boundary, load, ramp.
@@ -102,6 +102,7 @@ class Lanes(NamedTuple):
     case: IntArray
     active: IntArray
     steps: IntArray
+    zone_steps: IntArray
     fallbacks: IntArray
     status: IntArray
     finishing: IntArray
@@ -109,6 +110,7 @@ class Lanes(NamedTuple):
     schedule: FloatArray
     charge_radius: FloatArray
     inner_mass: FloatArray
+    outer_mass: FloatArray
     old_radius: FloatArray
     peak: FloatArray
     work: FloatArray
@@ -145,16 +147,17 @@ def _make_lanes(zones: int) -> Lanes:
         np.zeros(zone_size), np.zeros(row_size),
         EdgeModels(np.zeros((LANES, 11), np.int64), np.zeros((LANES, 11, 3, 3))),
         np.full(LANES, _IDLE), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64),
+        np.zeros(LANES, np.int64),
         np.zeros(LANES, np.int64), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64),
         np.zeros((LANES, 8)), np.zeros((LANES, 4)), np.ones(LANES), np.ones(LANES),
-        np.zeros(LANES), np.zeros(LANES), np.zeros((LANES, 3)),
+        np.ones(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros((LANES, 3)),
     )  # fmt: skip
     for lane in range(LANES):
         clear_lane(state.zones, state.rows, lane)
     return state
 
 
-@kernel
+@inline_kernel
 def _clock(state: Lanes, lane: int) -> Clock:
     c = state.clock
     return Clock(
@@ -163,7 +166,7 @@ def _clock(state: Lanes, lane: int) -> Clock:
     )  # fmt: skip
 
 
-@kernel
+@inline_kernel
 def _set_clock(state: Lanes, lane: int, clock: Clock) -> None:
     for k in range(len(clock)):
         state.clock[lane, k] = clock[k]
@@ -176,20 +179,22 @@ def _start(state: Lanes, cases: Cases, lane: int, row: int, record: FloatArray) 
     body, model, _, clock, active = prepare(case)
     load_lane(state.zones, state.rows, state.edges, lane, body, case.material, model)
     state.case[lane], state.active[lane] = row, active
-    state.steps[lane] = state.fallbacks[lane] = state.finishing[lane] = 0
+    state.steps[lane] = state.zone_steps[lane] = state.fallbacks[lane] = 0
+    state.finishing[lane] = 0
     _set_clock(state, lane, clock)
     schedule = schedule_of(case)
     for k in range(len(schedule)):
         state.schedule[lane, k] = schedule[k]
     state.charge_radius[lane], state.inner_mass[lane] = case.load.charge_radius, body.mass[0]
-    state.peak[lane] = 0.0
-    state.work[lane] = 0.0
+    state.outer_mass[lane], state.peak[lane] = body.mass[case.zones], 0.0
+    for k in range(state.work.shape[1]):
+        state.work[lane, k] = 0.0
     record[lane, 0, 0], record[lane, 0, 1], record[lane, 0, 2] = 0.0, body.radius[0], clock.pressure
     status = status_after(case.load, clock, 1.0, body.radius[0])
     state.status[lane] = NOT_CONVERGED if status == OK else status
 
 
-@kernel
+@lean_kernel
 def _begin_step(state: Lanes) -> None:
     """Set step and kick of every lane."""
     rows = state.rows
@@ -210,10 +215,10 @@ def _begin_step(state: Lanes) -> None:
         state.old_radius[lane] = state.zones[RADIUS + lane]
 
 
-@kernel
+@lean_kernel
 def _after_kick(state: Lanes, cases: Cases) -> int:
     """Let the waves reach their next zone and move outermost nodes; highest number of zones."""
-    zones, rows = state.zones, state.rows
+    zones = state.zones
     last = cases.common.zones
     most = 0
     for lane in range(LANES):
@@ -221,26 +226,39 @@ def _after_kick(state: Lanes, cases: Cases) -> int:
             continue
         active = state.active[lane]
         if active == last:
-            here = last * BLOCK + lane
-            case = _annulus(cases, state.case[lane])
-            radius = zones[here + RADIUS]
-            velocity, spent = kick_boundary(
-                case, rows[KICK + lane], radius, case.outer_radius, zones[here + VELOCITY],
-                zones[here + FORCE], _outer_mass(case),
-            )  # fmt: skip
-            zones[here + VELOCITY] = velocity
-            zones[here + RADIUS] = radius + rows[STEP + lane] * velocity
-            state.work[lane, 0] += spent
+            _move_boundary(state, cases, lane)
         peak = max(state.peak[lane], abs(zones[VELOCITY + lane]))
         state.peak[lane] = peak
         if active < last and abs(zones[(active - 1) * BLOCK + VELOCITY + lane]) > AT_REST * peak:
             active += 1
             state.active[lane] = active
+        state.zone_steps[lane] += active
         most = max(most, active)
     return most
 
 
 @kernel
+def _move_boundary(state: Lanes, cases: Cases, lane: int) -> None:
+    """Kick and move the outermost node of a lane whose wave has arrived there."""
+    zones, rows = state.zones, state.rows
+    case = _annulus(cases, state.case[lane])
+    here = cases.common.zones * BLOCK + lane
+    velocity, spent = kick_boundary(
+        case, rows[KICK + lane], zones[here + RADIUS], case.outer_radius, zones[here + VELOCITY],
+        zones[here + FORCE], state.outer_mass[lane],
+    )  # fmt: skip
+    zones[here + VELOCITY] = velocity
+    zones[here + RADIUS] += rows[STEP + lane] * velocity
+    state.work[lane, 0] += spent
+
+
+@kernel
+def _status(cases: Cases, row: int, clock: Clock, limit: float, radius: float) -> int:
+    """Status after a step of a case."""
+    return status_after(_annulus(cases, row).load, clock, limit, radius)
+
+
+@lean_kernel
 def _finish_step(state: Lanes, cases: Cases, record: FloatArray) -> int:
     """Load the walls, advance the clocks, note the outcome; the number of lanes that are done."""
     zones, rows = state.zones, state.rows
@@ -271,20 +289,14 @@ def _finish_step(state: Lanes, cases: Cases, record: FloatArray) -> int:
         record[lane, steps, 0] = clock.time
         record[lane, steps, 1] = radius
         record[lane, steps, 2] = clock.pressure
-        if limit <= 0.0 or not np.isfinite(clock.speed):
-            state.status[lane] = UNSTABLE
-        elif packed.tabulated[k] or state.finishing[lane] == 1:
-            status = status_after(_annulus(cases, row).load, clock, limit, radius)
-            if status != OK or state.finishing[lane] == 1:
+        finishing = state.finishing[lane] == 1
+        # Whether all is well is looked at closely only where it may not be.
+        if finishing or packed.tabulated[k] or not (limit > 0.0 and np.isfinite(clock.speed)):
+            status = _status(cases, row, clock, limit, radius)
+            if finishing or status != OK:
                 state.status[lane] = status
         done += 1 if state.status[lane] != NOT_CONVERGED else 0
     return done
-
-
-@kernel
-def _outer_mass(case: Annulus) -> float:
-    """Mass of the outermost node."""
-    return float(prepare(case)[0].mass[case.zones])
 
 
 @kernel
@@ -306,7 +318,7 @@ def _retire(
     run = March(
         state.status[lane], body, record[lane, : state.steps[lane] + 1], work, clock.reversal,
         clock.speed, 0.5 * clock.previous_step, state.active[lane], state.steps[lane],
-        state.fallbacks[lane],
+        state.zone_steps[lane], state.fallbacks[lane],
     )  # fmt: skip
     end_state(case, run, cases.holes.total_energy[row], out[row])
     if run.status == OK:
@@ -382,5 +394,8 @@ def march_many(
 def _longer(record: FloatArray) -> FloatArray:
     """The record with twice as many rows."""
     longer = np.empty((LANES, 2 * record.shape[1], 3))
-    longer[:, : record.shape[1]] = record
+    for lane in range(LANES):
+        for k in range(record.shape[1]):
+            for i in range(3):
+                longer[lane, k, i] = record[lane, k, i]
     return longer

@@ -18,7 +18,8 @@ from typing import Final, NamedTuple
 
 from castblast.kernel import fused_kernel, kernel, lean_kernel
 from castblast.nearfield.lagrangian import Body, FloatArray, Material, after_opening
-from castblast.nearfield.mohr_coulomb import IntArray, PlaneStrength, YieldModel, edge_return
+from castblast.nearfield.mohr_coulomb import IntArray, YieldModel, edge_return
+from castblast.nearfield.single_plane import PlaneStrength
 from castblast.nearfield.zone import (
     Deformation,
     Stress,
@@ -44,13 +45,14 @@ _ZONE_ROWS: Final = 17
 BLOCK: Final = _ZONE_ROWS * LANES
 
 # Rows of what a lane has once: constants, the step, sums; then scratch of the zone at hand.
-_LANE_ROWS: Final = 39
+_LANE_ROWS: Final = 41
 (
-    FRICTION, DILATION, LAME, TWICE_SHEAR, STIFFNESS, SHEAR_COMPLIANCE, UCS, DENSITY, LINEAR,
-    QUADRATIC, BRITTLE, ACTIVE, KICK, STEP, PER_SECOND, LIMIT, FASTEST, SHEAR_WORK, TENSILE_WORK,
-    VISCOUS_WORK, INNER, NEW_WIDTH, NEW_MEAN, NEW_PER_AREA, RADIAL_STRAIN, HOOP_STRAIN, NEW_RADIAL,
-    NEW_HOOP, NEW_AXIAL, FLOW_SHEAR, FLOW_OPENING, FLOW_SHEAR_WORK, FLOW_TENSILE_WORK, FLOW_STRAIN,
-    NOW_UCS, NOW_TENSION, SHEAR_SHORTFALL, TENSILE_SHORTFALL, UNSOLVED,
+    FRICTION, DILATION, LAME, TWICE_SHEAR, STIFFNESS, SHEAR_COMPLIANCE, TENSILE_COMPLIANCE,
+    SHEAR_STRAIN, UCS, DENSITY, LINEAR, QUADRATIC, BRITTLE, ACTIVE, KICK, STEP, PER_SECOND,
+    LIMIT, FASTEST, SHEAR_WORK, TENSILE_WORK, VISCOUS_WORK, INNER, NEW_WIDTH, NEW_MEAN,
+    NEW_PER_AREA, RADIAL_STRAIN, HOOP_STRAIN, NEW_RADIAL, NEW_HOOP, NEW_AXIAL, FLOW_SHEAR,
+    FLOW_OPENING, FLOW_SHEAR_WORK, FLOW_TENSILE_WORK, FLOW_STRAIN, NOW_UCS, NOW_TENSION,
+    SHEAR_SHORTFALL, TENSILE_SHORTFALL, UNSOLVED,
 ) = (row * LANES for row in range(_LANE_ROWS))  # fmt: skip
 
 
@@ -80,8 +82,11 @@ def kick_and_move(zones: FloatArray, lanes: FloatArray, nodes: int) -> None:
         block = j * BLOCK
         for lane in range(LANES):
             velocity = zones[block + VELOCITY + lane]
-            kicked = velocity + lanes[KICK + lane] * zones[block + FORCE + lane] * (
-                zones[block + PER_MASS + lane]
+            kicked = (
+                velocity
+                + lanes[KICK + lane]
+                * zones[block + FORCE + lane]
+                * (zones[block + PER_MASS + lane])
             )
             velocity = kicked if j < lanes[ACTIVE + lane] else velocity
             zones[block + VELOCITY + lane] = velocity
@@ -93,6 +98,7 @@ def _planes(lanes: FloatArray, lane: int) -> PlaneStrength:
     return PlaneStrength(
         lanes[FRICTION + lane], lanes[DILATION + lane], lanes[LAME + lane],
         lanes[TWICE_SHEAR + lane], lanes[STIFFNESS + lane], lanes[SHEAR_COMPLIANCE + lane],
+        lanes[TENSILE_COMPLIANCE + lane], lanes[SHEAR_STRAIN + lane],
     )  # fmt: skip
 
 
@@ -189,7 +195,8 @@ def _flow_and_resist(zones: FloatArray, lanes: FloatArray, block: int) -> None:
         zones[here + VISCOUS] = r.viscous
         lanes[LIMIT + lane] = min(lanes[LIMIT + lane], r.limit)
         lanes[FASTEST + lane] = max(
-            lanes[FASTEST + lane], max(abs(d.radial), abs(d.hoop))  # noqa: PLW3301
+            lanes[FASTEST + lane],
+            max(abs(d.radial), abs(d.hoop)),
         )
         zones[here + FORCE] += r.through - r.around
         zones[here + BLOCK + FORCE] = -r.through - r.around
@@ -249,14 +256,19 @@ def load_lane(
     lanes[LAME + lane], lanes[TWICE_SHEAR + lane] = planes.lame, planes.twice_shear
     lanes[STIFFNESS + lane] = planes.stiffness
     lanes[SHEAR_COMPLIANCE + lane] = planes.shear_compliance
+    lanes[TENSILE_COMPLIANCE + lane] = planes.tensile_compliance
+    lanes[SHEAR_STRAIN + lane] = planes.shear_strain
     lanes[UCS + lane], lanes[DENSITY + lane] = material.ucs, material.density
     lanes[LINEAR + lane] = material.linear_viscosity
     lanes[QUADRATIC + lane] = material.quadratic_viscosity
     lanes[BRITTLE + lane] = 1.0 if material.brittle else 0.0
     for row in (SHEAR_WORK, TENSILE_WORK, VISCOUS_WORK):
         lanes[row + lane] = 0.0
-    edges.size[lane] = model.size
-    edges.inverse[lane] = model.inverse
+    for k in range(model.size.size):
+        edges.size[lane, k] = model.size[k]
+        for i in range(3):
+            for j in range(3):
+                edges.inverse[lane, k, i, j] = model.inverse[k, i, j]
     last = body.width.size
     for j in range(last + 1):
         here = j * BLOCK + lane

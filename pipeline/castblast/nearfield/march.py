@@ -84,7 +84,8 @@ class Annulus(NamedTuple):
     material : Material
     friction, dilation : float [-]
         N of the friction and of the dilation angle.
-    inner_radius, outer_radius, first_width : float [m]
+    inner_radius, outer_radius, first_width, reach : float [m]
+        The mesh, see `graded_radii`.
     zones : int
     in_situ_stress : float [Pa]
     quiet : bool
@@ -105,6 +106,7 @@ class Annulus(NamedTuple):
     inner_radius: float
     outer_radius: float
     first_width: float
+    reach: float
     zones: int
     in_situ_stress: float
     quiet: bool
@@ -133,7 +135,8 @@ class March(NamedTuple):
         Time by which the velocities of `body` lag behind its positions.
     active : int
         Zones that the wave has reached.
-    steps, fallbacks : int
+    steps, zone_steps, fallbacks : int
+        Steps, zones in motion summed over them, failed stress returns.
     """
 
     status: int
@@ -145,6 +148,7 @@ class March(NamedTuple):
     half_kick: float
     active: int
     steps: int
+    zone_steps: int
     fallbacks: int
 
 
@@ -199,7 +203,9 @@ def _longer(record: FloatArray, used: int) -> FloatArray:
     if used < record.shape[0]:
         return record
     longer = np.empty((2 * record.shape[0], 3))
-    longer[:used] = record
+    for k in range(used):
+        for i in range(3):
+            longer[k, i] = record[k, i]
     return longer
 
 
@@ -214,7 +220,9 @@ def schedule_of(case: Annulus) -> Schedule:
 def prepare(case: Annulus) -> tuple[Body, YieldModel, FloatArray, Clock, int]:
     """Body under the pressure of time zero, yield model, ledger, clock, zones in motion."""
     material, load = case.material, case.load
-    nodes = graded_radii(case.inner_radius, case.outer_radius, case.zones, case.first_width)
+    nodes = graded_radii(
+        case.inner_radius, case.outer_radius, case.zones, case.first_width, case.reach
+    )
     model = make_yield_model(
         material.bulk_modulus, material.shear_modulus, case.friction, case.dilation
     )
@@ -248,7 +256,8 @@ def march(case: Annulus) -> March:
     record = np.empty((2048, 3))
     record[0, 0], record[0, 1], record[0, 2] = 0.0, body.radius[0], clock.pressure
     peak = 0.0
-    status, steps, fallbacks = status_after(load, clock, 1.0, body.radius[0]), 0, 0
+    status = status_after(load, clock, 1.0, body.radius[0])
+    steps, zone_steps, fallbacks = 0, 0, 0
     if status == OK:
         status = NOT_CONVERGED
     while status == NOT_CONVERGED and steps < case.max_steps:
@@ -263,6 +272,7 @@ def march(case: Annulus) -> March:
         for i in range(active + 1):
             body.radius[i] += clock.step * body.velocity[i]
         steps += 1
+        zone_steps += active
         limit, failed = update_zones(body, active, clock.step, case.material, model, work)
         fallbacks += failed
         radius = body.radius[0]
@@ -282,5 +292,5 @@ def march(case: Annulus) -> March:
             status = NOT_CONVERGED
     return March(
         status, body, record[: steps + 1].copy(), work, clock.reversal, clock.speed,
-        0.5 * clock.previous_step, active, steps, fallbacks,
+        0.5 * clock.previous_step, active, steps, zone_steps, fallbacks,
     )  # fmt: skip

@@ -26,15 +26,22 @@ stress and logarithmic strain), strengths are passed with every call because the
 
 from __future__ import annotations
 
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.kernel import fused_kernel, kernel
+from castblast.kernel import kernel
+from castblast.nearfield.single_plane import (
+    TOLERANCE,
+    PlaneStrength,
+    admissible,
+    single_plane_return,
+)
 
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int64]
+_Number = TypeVar("_Number", float, FloatArray)
 
 # Planes: 0, 1, 2 = shear (1,3), (1,2), (2,3); 3, 4, 5 = tension on s3, s2, s1.
 SHEAR_PLANES = 3
@@ -55,31 +62,6 @@ _SETS = np.array(
     dtype=np.int64,
 )
 _FIRST_EDGE = 2
-#: Tolerance of admissibility over the stress scale of a trial.
-TOLERANCE = 1e-10
-
-
-class PlaneStrength(NamedTuple):
-    """What the return by one plane needs of a rock.
-
-    Attributes
-    ----------
-    friction, dilation : float [-]
-        N of the friction angle (> 1) and of the dilation angle (1 <= N_psi <= N).
-    lame, twice_shear : float [Pa]
-        Elastic constants lambda and 2 G.
-    stiffness : float [Pa]
-        lambda + 2 G.
-    shear_compliance : float [1/Pa]
-        Multiplier per excess stress on the plane (1, 3) alone.
-    """
-
-    friction: float
-    dilation: float
-    lame: float
-    twice_shear: float
-    stiffness: float
-    shear_compliance: float
 
 
 class YieldModel(NamedTuple):
@@ -131,15 +113,15 @@ class ReturnedStress(NamedTuple):
     fallback: bool
 
 
-def friction_number(angle: FloatArray) -> FloatArray:
+def friction_number(angle: _Number) -> _Number:
     """N = (1 + sin) / (1 - sin) of friction or dilation angles [rad]."""
     sine = np.sin(angle)
-    return np.asarray((1.0 + sine) / (1.0 - sine))
+    return (1.0 + sine) / (1.0 - sine)  # type: ignore[no-any-return]
 
 
-def apex_tension(ucs: FloatArray, friction_angle: FloatArray) -> FloatArray:
+def apex_tension(ucs: _Number, friction_angle: _Number) -> _Number:
     """Isotropic tension at the apex of the cone, c / tan phi = UCS / (N - 1) [Pa]."""
-    return np.asarray(ucs / (friction_number(friction_angle) - 1.0))
+    return ucs / (friction_number(friction_angle) - 1.0)
 
 
 @kernel
@@ -224,9 +206,11 @@ def make_yield_model(
         # Without dilation the three shear flows are dependent: the set {13, 12, 23} drops out.
         if _invert(matrix, n, inverse[s]):
             size[s] = n
+    stiffness = lame + twice_shear
     planes = PlaneStrength(
-        friction, dilation, lame, twice_shear, lame + twice_shear, inverse[0, 0, 0]
-    )
+        friction, dilation, lame, twice_shear, stiffness, inverse[0, 0, 0], 1.0 / stiffness,
+        np.sqrt(2.0 / 3.0 * (1.0 + dilation * dilation)),
+    )  # fmt: skip
     return YieldModel(planes, size, inverse)
 
 
@@ -269,93 +253,6 @@ def _share(first: int, second: int, third: int, plane: int, a: float, b: float, 
     if plane == second:
         return b
     return c if plane == third else 0.0
-
-
-class SinglePlane(NamedTuple):
-    """Return of a trial stress by one plane, on the axes radial, hoop, axial.
-
-    Attributes
-    ----------
-    radial, hoop, axial : float [Pa]
-        The trial stress itself where it is admissible or where one plane is not enough.
-    shear, opening : float [-]
-        Multipliers of the shear plane (1, 3) and of the tension plane; at most one is not zero.
-    shear_radial, shear_hoop, shear_axial : float [-]
-        Plastic strain of shear.
-    opening_radial, opening_hoop, opening_axial : float [-]
-        Plastic strain of tension.
-    shear_excess, tensile_excess : float [Pa]
-        How far the trial lies beyond either plane; negative inside.
-    solved : bool
-        False: an edge or a corner is needed, `return_to_yield` finds it.
-    """
-
-    radial: float
-    hoop: float
-    axial: float
-    shear: float
-    opening: float
-    shear_radial: float
-    shear_hoop: float
-    shear_axial: float
-    opening_radial: float
-    opening_hoop: float
-    opening_axial: float
-    shear_excess: float
-    tensile_excess: float
-    solved: bool
-
-
-@fused_kernel
-def single_plane_return(
-    strength: PlaneStrength, radial: float, hoop: float, axial: float, ucs: float, tension: float
-) -> SinglePlane:
-    """Return a trial stress by the one plane that nearly every return needs.
-
-    Without a branch, so that a loop over many rocks becomes vector code: whatever does not apply
-    is computed all the same and not selected. Arguments as in `return_to_yield`.
-    """
-    friction, dilation = strength.friction, strength.dilation
-    lame, twice_shear = strength.lame, strength.twice_shear
-    high = max(radial, max(hoop, axial))  # noqa: PLW3301  (two operands: vector instructions)
-    low = min(radial, min(hoop, axial))  # noqa: PLW3301
-    mid = max(min(radial, hoop), min(max(radial, hoop), axial))
-    shear_excess, tensile_excess = friction * high - low - ucs, high - tension
-    tolerance = TOLERANCE * (abs(low) + abs(high) + ucs)
-    a = strength.shear_compliance * max(shear_excess, 0.0)
-    volume = lame * (dilation - 1.0) * a
-    sheared = _admissible(
-        friction, low - volume + twice_shear * a, mid - volume,
-        high - volume - twice_shear * dilation * a, ucs, tension, tolerance,
-    )  # fmt: skip
-    b = tensile_excess / strength.stiffness
-    opened = (tensile_excess > 0.0) & _admissible(
-        friction, low - lame * b, mid - lame * b, tension, ucs, tension, tolerance
-    )
-    a = a if sheared else 0.0
-    b = b if opened and not sheared else 0.0
-    # Axes of the most and of the least compressive stress; equal ones in the order of `_rank`.
-    radial_low = (radial <= hoop) & (radial <= axial)
-    hoop_low = (not radial_low) & (hoop <= axial)
-    axial_low = (not radial_low) & (not hoop_low)
-    axial_high = (not axial_low) & (axial >= hoop) & (axial >= radial)
-    hoop_high = (not hoop_low) & (not axial_high) & (hoop >= radial)
-    radial_high = (not hoop_high) & (not axial_high)
-    dilated = dilation * a
-    shear_r = -a if radial_low else (dilated if radial_high else 0.0)
-    shear_h = -a if hoop_low else (dilated if hoop_high else 0.0)
-    shear_a = -a if axial_low else (dilated if axial_high else 0.0)
-    opening_r = b if radial_high else 0.0
-    opening_h = b if hoop_high else 0.0
-    opening_a = b if axial_high else 0.0
-    volume = lame * ((dilation - 1.0) * a + b)
-    return SinglePlane(
-        radial - volume - twice_shear * (shear_r + opening_r),
-        hoop - volume - twice_shear * (shear_h + opening_h),
-        axial - volume - twice_shear * (shear_a + opening_a),
-        a, b, shear_r, shear_h, shear_a, opening_r, opening_h, opening_a,
-        shear_excess, tensile_excess, sheared or opened,
-    )  # fmt: skip
 
 
 @kernel
@@ -420,30 +317,13 @@ def edge_return(
         s1 = low - volume - twice_shear * (p1 + t1)
         s2 = mid - volume - twice_shear * (p2 + t2)
         s3 = high - volume - twice_shear * (p3 + t3)
-        if _admissible(friction, s1, s2, s3, ucs, tension, tolerance):
+        if admissible(friction, s1, s2, s3, ucs, tension, tolerance):
             sheared = l13 + l12 + l23
             return _unsorted(i, j, s1, s2, s3, p1, p2, p3, t1, t2, t3, sheared, False)
     spread = (low + mid + high - 3.0 * tension) / (3.0 * (3.0 * lame + twice_shear))
     return _unsorted(
         i, j, tension, tension, tension, 0.0, 0.0, 0.0, spread, spread, spread, 0.0, True
     )
-
-
-@fused_kernel
-def _admissible(
-    friction: float, s1: float, s2: float, s3: float, ucs: float, tension: float, tolerance: float
-) -> bool:
-    """All six planes, on the axes as sorted by the trial stress; without a branch."""
-    limit = ucs + friction * tolerance
-    shear = (
-        (friction * s3 - s1 <= limit)
-        & (friction * s2 - s1 <= limit)
-        & (friction * s3 - s2 <= limit)
-    )
-    tensile = (
-        (s3 <= tension + tolerance) & (s2 <= tension + tolerance) & (s1 <= tension + tolerance)
-    )
-    return shear & tensile
 
 
 @kernel

@@ -37,19 +37,17 @@ STATE_NAMES = (
     "explosion_pressure", "equilibrium_time", "end_time", "wall_velocity", "settled", "gas_work",
     "kinetic_energy", "elastic_energy", "plastic_work", "tensile_work", "viscous_work",
     "boundary_work", "head_energy", "ramp_energy", "gas_energy", "energy_residual", "n_steps",
-    "return_map_fallbacks",
+    "zone_steps", "return_map_fallbacks",
 )  # fmt: skip
-#: The hole radius is averaged from this time on, in units of the time at which it turns back.
-WINDOW_START = 1.3
+#: The end state is the mean over this window, in units of the time at which the wall turns back.
+WINDOW = (1.6, 1.9)
 #: Relative swing of the hole radius in the window below which the hole has settled.
 SETTLED_SWING = 0.01
 #: Wall velocity over wave speed below which the hole has settled (paper mode).
 SETTLED_VELOCITY = 1e-3
 #: Largest open share of the energy ledger.
 LEDGER_TOLERANCE = 1e-3
-_STEPS, _FALLBACKS, _SETTLED = (
-    STATE_NAMES.index(name) for name in ("n_steps", "return_map_fallbacks", "settled")
-)
+_SETTLED, _STEPS = STATE_NAMES.index("settled"), STATE_NAMES.index("n_steps")
 #: Plastic shear multiplier that bounds the crushed zone.
 CRUSHED_STRAIN = 0.01
 #: Plastic multiplier that counts as yield: far below any elastic strain at yield.
@@ -104,11 +102,28 @@ def last_time_outside(record: FloatArray, value: float, band: float) -> float:
 
 
 @kernel
+def _outermost(values: FloatArray, threshold: float) -> int:
+    """Last zone whose value is above a threshold; -1 if none is."""
+    for j in range(values.size - 1, -1, -1):
+        if values[j] > threshold:
+            return j
+    return -1
+
+
+@kernel
+def _between(nodes: FloatArray, j: int, share: float) -> float:
+    """Radius [m] at a share of the way from the centre of zone `j` to the next, logarithmically."""
+    centre = np.log(0.5 * (nodes[j] + nodes[j + 1]))
+    following = np.log(0.5 * (nodes[j + 1] + nodes[j + 2]))
+    return float(np.exp(centre + share * (following - centre)))
+
+
+@kernel
 def threshold_radius(nodes: FloatArray, strain: FloatArray, threshold: float) -> float:
     """Outermost initial radius [m] at which a zone strain reaches a threshold.
 
-    Linear between zone centres, so that it moves smoothly and not by whole zones; the radius of
-    the wall if the threshold is reached nowhere.
+    A power law between zone centres, so that it moves smoothly and not by whole zones; the radius
+    of the wall if the threshold is reached nowhere.
 
     Parameters
     ----------
@@ -116,17 +131,33 @@ def threshold_radius(nodes: FloatArray, strain: FloatArray, threshold: float) ->
         Initial node radii.
     strain : array (n,) [-]
         Values at zone centres.
+    threshold : float [-]
+        Positive.
     """
-    for j in range(strain.size - 1, -1, -1):
-        if strain[j] <= threshold:
-            continue
-        centre = 0.5 * (nodes[j] + nodes[j + 1])
-        if j == strain.size - 1:
-            return float(nodes[j + 1])
-        following = 0.5 * (nodes[j + 1] + nodes[j + 2])
-        share = (strain[j] - threshold) / (strain[j] - strain[j + 1])
-        return float(centre + share * (following - centre))
-    return float(nodes[0])
+    j = _outermost(strain, threshold)
+    if j < 0:
+        return float(nodes[0])
+    if j == strain.size - 1:
+        return float(nodes[j + 1])
+    inside, outside = np.log(strain[j]), np.log(max(strain[j + 1], 1e-9 * threshold))
+    return _between(nodes, j, (inside - np.log(threshold)) / (inside - outside))
+
+
+@kernel
+def yield_radius(nodes: FloatArray, multiplier: FloatArray) -> float:
+    """Outermost initial radius [m] that has yielded; the wall if none has.
+
+    Between the last zone that yielded and the next, where the multiplier is minus the strain by
+    which it fell short, it is interpolated linearly: a zone that starts to yield moves the radius
+    continuously.
+    """
+    j = _outermost(multiplier, YIELD_STRAIN)
+    if j < 0:
+        return float(nodes[0])
+    if j == multiplier.size - 1:
+        return float(nodes[j + 1])
+    inside = multiplier[j] - YIELD_STRAIN
+    return _between(nodes, j, inside / (multiplier[j] - multiplier[j + 1]))
 
 
 @kernel
@@ -135,9 +166,9 @@ def damage_radii(body: Body) -> tuple[float, float, float, float, float]:
     nodes = body.initial_radius
     return (
         threshold_radius(nodes, body.shear_multiplier, CRUSHED_STRAIN),
-        threshold_radius(nodes, body.shear_multiplier, YIELD_STRAIN),
-        threshold_radius(nodes, body.hoop_multiplier, YIELD_STRAIN),
-        threshold_radius(nodes, body.tensile_multiplier, YIELD_STRAIN),
+        yield_radius(nodes, body.shear_multiplier),
+        yield_radius(nodes, body.hoop_multiplier),
+        yield_radius(nodes, body.tensile_multiplier),
         threshold_radius(nodes, body.shear_strain, INTENSE_STRAIN),
     )
 
@@ -149,20 +180,27 @@ def histories(record: FloatArray, out: FloatArray) -> None:
     The times are end * (k / (points - 1))^2, k = 0 ... points - 1; values are interpolated
     between steps. `out` (3, points) is filled.
     """
-    end = record[-1, 0]
+    last = record.shape[0] - 1
     points = out.shape[1]
+    step = 0
     for k in range(points):
-        share = k / (points - 1)
-        out[0, k] = end * share * share
-    out[1] = np.interp(out[0], record[:, 0], record[:, 2])
-    out[2] = np.interp(out[0], record[:, 0], record[:, 1])
+        place = k / (points - 1)
+        time = record[last, 0] * place * place
+        while step < last - 1 and record[step + 1, 0] < time:
+            step += 1
+        share = (time - record[step, 0]) / (record[step + 1, 0] - record[step, 0])
+        out[0, k] = time
+        out[1, k] = record[step, 2] + share * (record[step + 1, 2] - record[step, 2])
+        out[2, k] = record[step, 1] + share * (record[step + 1, 1] - record[step, 1])
 
 
 @kernel
-def no_state(status: int, steps: int, fallbacks: int, out: FloatArray) -> None:
+def no_state(status: int, steps: int, zone_steps: int, fallbacks: int, out: FloatArray) -> None:
     """End state that holds nothing but its status and counts."""
-    out[:] = np.nan
-    out[0], out[_STEPS], out[_FALLBACKS], out[_SETTLED] = status, steps, fallbacks, 0.0
+    for k in range(out.size):
+        out[k] = np.nan
+    out[0], out[_SETTLED] = status, 0.0
+    out[_STEPS], out[_STEPS + 1], out[_STEPS + 2] = steps, zone_steps, fallbacks
 
 
 @kernel
@@ -179,7 +217,7 @@ def end_state(case: Annulus, run: March, total_energy: float, out: FloatArray) -
         Filled; NaN if the march has no end state.
     """
     if run.status != _OK:
-        no_state(run.status, run.steps, run.fallbacks, out)
+        no_state(run.status, run.steps, run.zone_steps, run.fallbacks, out)
         return
     record, load = run.record, case.load
     end = record[-1, 0]
@@ -190,7 +228,7 @@ def end_state(case: Annulus, run: March, total_energy: float, out: FloatArray) -
         wave_speed = np.sqrt(stiffness / material.density)
         settled = abs(run.wall_velocity) < SETTLED_VELOCITY * wave_speed
     else:
-        window = mean_over(record, WINDOW_START * run.reversal_time, end)
+        window = mean_over(record, WINDOW[0] * run.reversal_time, end)
         radius = window.mean
         settled = window.highest - window.lowest < SETTLED_SWING * radius
     crushed, plastic, hoop, tensile, intense = damage_radii(run.body)
@@ -222,7 +260,7 @@ def end_state(case: Annulus, run: March, total_energy: float, out: FloatArray) -
         turn * work[VISCOUS], turn * work[BOUNDARY],
         charge * (total_energy - energy(load.isentrope, start_volume)), turn * work[RAMP],
         charge * energy(load.isentrope, final_volume), residual, float(run.steps),
-        float(run.fallbacks),
+        float(run.zone_steps), float(run.fallbacks),
     )  # fmt: skip
-    for k in range(len(values)):  # noqa: PLC0200
+    for k in range(len(values)):
         out[k] = values[k]

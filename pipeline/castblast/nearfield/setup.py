@@ -25,6 +25,7 @@ from castblast.nearfield.case import (
 from castblast.nearfield.lagrangian import Material
 from castblast.nearfield.march import Annulus, WallLoad
 from castblast.nearfield.mohr_coulomb import apex_tension, friction_number
+from castblast.nearfield.outcome import WINDOW
 
 #: Outer radius of the published model [m].
 PAPER_RADIUS = 5.5
@@ -33,11 +34,12 @@ PAPER_END = 0.9
 #: Outer radius of the equilibrium mode in hole radii. Zones that no wave has reached cost nothing;
 #: only in the weakest dilatant rock does anything beyond 250 hole radii matter.
 EQUILIBRIUM_RADII = 1000.0
-#: Zones of the two modes, and width of the first one in hole radii at that number of zones.
+#: Zones of the two modes, and width of those at the wall in hole radii at that number of zones;
+#: in equilibrium mode it is the factor of `_wall_width`.
 PAPER_ZONES, PAPER_WIDTH = 256, 0.04
-EQUILIBRIUM_ZONES, EQUILIBRIUM_WIDTH = 144, 0.12
-#: The end state is the mean over this window, in units of the time at which the wall turns back.
-WINDOW = (1.3, 1.8)
+EQUILIBRIUM_ZONES, EQUILIBRIUM_WIDTH = 104, 0.25
+#: Distance from the wall, in hole radii, over which the mesh of the equilibrium mode stays fine.
+EQUILIBRIUM_REACH = 150.0
 #: Share of the largest stable step.
 COURANT = 0.85
 MAX_STEPS = 300_000
@@ -60,6 +62,7 @@ class HoleParameters(NamedTuple):
     inner_radius: FloatArray
     outer_radius: FloatArray
     first_width: FloatArray
+    reach: FloatArray
     in_situ_stress: FloatArray
     charge_radius: FloatArray
     rise_time: FloatArray
@@ -114,21 +117,21 @@ def hole_parameters(
     bulk = c.young_modulus / (3.0 * (1.0 - 2.0 * c.poisson_ratio))
     shear = c.young_modulus / (2.0 * (1.0 + c.poisson_ratio))
     apex = apex_tension(c.ucs, c.friction_angle)
-    tension = (
-        apex if settings.tension == TensionMode.NONE else np.minimum(c.tensile_strength, apex)
-    )
+    tension = apex if settings.tension == TensionMode.NONE else np.minimum(c.tensile_strength, apex)
     inner = 0.5 * c.diameter
     paper = settings.mode == EndMode.PAPER
     outer = np.full_like(inner, settings.outer_radius)
     if settings.outer_radius == 0.0:
         outer = np.full_like(inner, PAPER_RADIUS) if paper else EQUILIBRIUM_RADII * inner
-    default, width = _mesh(settings)
     wave_speed = np.sqrt((bulk + 4.0 / 3.0 * shear) / c.density)
+    default = _default_zones(settings)
+    width = PAPER_WIDTH if paper else _wall_width(wave_speed * c.rise_time / inner)
+    reach = np.full_like(inner, np.inf) if paper else EQUILIBRIUM_REACH * inner
     end = PAPER_END * (outer - inner) / wave_speed if paper else np.zeros_like(inner)
     energies = np.array([e.total_energy for e in explosives])
     return HoleParameters(
         c.density, bulk, shear, c.ucs, tension, friction, friction_number(c.dilation_angle), inner,
-        outer, width * inner * default / (settings.zones or default), c.in_situ_stress,
+        outer, width * inner * default / (settings.zones or default), reach, c.in_situ_stress,
         0.5 * c.charge_diameter, c.rise_time, end, energies[c.explosive],
     )  # fmt: skip
 
@@ -136,18 +139,28 @@ def hole_parameters(
 def common_parameters(settings: NearFieldSettings) -> CommonParameters:
     """Numbers that the settings give to all holes."""
     return CommonParameters(
-        int(settings.zones or _mesh(settings)[0]),
+        int(settings.zones or _default_zones(settings)),
         bool(settings.tension == TensionMode.BRITTLE),
         float(settings.quadratic_viscosity),
         float(settings.linear_viscosity),
     )
 
 
-def _mesh(settings: NearFieldSettings) -> tuple[int, float]:
-    """Default number of zones and width of the first one [hole radii] of the end mode."""
-    if settings.mode == EndMode.PAPER:
-        return PAPER_ZONES, PAPER_WIDTH
-    return EQUILIBRIUM_ZONES, EQUILIBRIUM_WIDTH
+def _default_zones(settings: NearFieldSettings) -> int:
+    """Zones of the end mode."""
+    return PAPER_ZONES if settings.mode == EndMode.PAPER else EQUILIBRIUM_ZONES
+
+
+def _wall_width(run: FloatArray) -> FloatArray:
+    """Width of the zones at the wall [hole radii] in equilibrium mode.
+
+    `run` is how far the p-wave travels while the load rises [hole radii]. What a coarse zone at
+    the wall gets wrong is the work during the rise; the longer the wave, the wider it may be. A
+    smooth function, so that the mesh adds no kink to the targets. See the mesh study.
+    """
+    return np.asarray(
+        EQUILIBRIUM_WIDTH * (run * run + 0.3**2) ** 0.25 / (1.0 + (run / 6.0) ** 2) ** 0.25
+    )
 
 
 @kernel
@@ -164,6 +177,6 @@ def make_annulus(
     load = WallLoad(True, isentrope, h.charge_radius[row], in_situ, 0.0, h.rise_time[row])
     return Annulus(
         material, h.friction[row], h.dilation[row], h.inner_radius[row], h.outer_radius[row],
-        h.first_width[row], common.zones, in_situ, True, load, h.end_time[row], WINDOW[1], COURANT,
-        MAX_STEPS,
+        h.first_width[row], h.reach[row], common.zones, in_situ, True, load, h.end_time[row],
+        WINDOW[1], COURANT, MAX_STEPS,
     )  # fmt: skip

@@ -74,7 +74,8 @@ class NearFieldResult(NamedTuple):
         With `gas_work` they add up to the energy of detonation.
     energy_residual : float [-]
         Open balance of the rock ledger over the gas work.
-    n_steps, return_map_fallbacks : int
+    n_steps, zone_steps, return_map_fallbacks : int
+        Steps, zones in motion summed over them, stress returns that failed.
     history_time, history_pressure, history_radius : array (history_points,) [s, Pa, m]
     """
 
@@ -103,6 +104,7 @@ class NearFieldResult(NamedTuple):
     gas_energy: float
     energy_residual: float
     n_steps: int
+    zone_steps: int
     return_map_fallbacks: int
     history_time: FloatArray
     history_pressure: FloatArray
@@ -129,7 +131,7 @@ def solve_near_field(
     state = np.empty(len(STATE_NAMES))
     points = np.full((3, max(settings.history_points, 2)), np.nan)
     if not possible((explosive,), _column(rock, hole), settings)[0]:
-        no_state(int(Status.BAD_INPUT), 0, 0, state)
+        no_state(int(Status.BAD_INPUT), 0, 0, 0, state)
         return _result(state, points)
     run = march(annulus := _annulus(explosive, rock, hole, settings))
     end_state(annulus, run, float(explosive.total_energy), state)
@@ -164,7 +166,7 @@ def plain(isentrope: ProductIsentrope) -> ProductIsentrope:
 def _result(state: FloatArray, points: FloatArray) -> NearFieldResult:
     """Give the numbers of an end state their names and types."""
     values: dict[str, Any] = dict(zip(STATE_NAMES, state.tolist(), strict=True))
-    for name in ("status", "n_steps", "return_map_fallbacks"):
+    for name in ("status", "n_steps", "zone_steps", "return_map_fallbacks"):
         values[name] = int(values[name])
     values["settled"] = bool(values["settled"])
     time, pressure, radius = points

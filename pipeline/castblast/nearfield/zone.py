@@ -15,13 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from castblast.kernel import fused_kernel
-from castblast.nearfield.mohr_coulomb import (
-    PlaneStrength,
-    ReturnedStress,
-    single_plane_return,
-)
+from castblast.nearfield.mohr_coulomb import ReturnedStress
+from castblast.nearfield.single_plane import PlaneStrength, single_plane_return
 
-#: The linear viscosity acts over at least this share of the radius, on however fine a mesh.
+#: The linear viscosity acts over this share of the radius, on however fine or coarse a mesh.
 VISCOUS_LENGTH = 0.04
 #: Share of the strength by which the hoop stress must be compressive to count as such.
 _COMPRESSIVE = 1e-6
@@ -176,7 +173,6 @@ def try_one_plane(
     radial = 0.5 * (old.radial + s.radial)
     hoop = 0.5 * (old.hoop + s.hoop)
     axial = 0.5 * (old.axial + s.axial)
-    dilation = planes.dilation
     return Trial(
         Flow(
             Stress(s.radial, s.hoop, s.axial),
@@ -184,12 +180,12 @@ def try_one_plane(
             s.opening,
             radial * s.shear_radial + hoop * s.shear_hoop + axial * s.shear_axial,
             radial * s.opening_radial + hoop * s.opening_hoop + axial * s.opening_axial,
-            s.shear * np.sqrt(2.0 / 3.0 * (1.0 + dilation * dilation)),
+            s.shear * planes.shear_strain,
         ),
         ucs,
         tension,
         min(planes.shear_compliance * s.shear_excess, 0.0),
-        min(s.tensile_excess / planes.stiffness, 0.0),
+        min(planes.tensile_compliance * s.tensile_excess, 0.0),
         s.solved,
     )
 
@@ -258,7 +254,7 @@ def resist(
     transit = d.width * np.sqrt(density / modulus)
     rate = -(d.radial + d.hoop) * per_second
     # mean / width = mean^2 per_area
-    damping = linear * max(1.0, VISCOUS_LENGTH * (d.mean * d.mean * d.per_area))
+    damping = linear * (VISCOUS_LENGTH * (d.mean * d.mean * d.per_area))
     damping = damping + max(quadratic * transit * rate, 0.0)
     viscous = modulus * transit * damping * rate * shrinking
     limit = transit * (np.sqrt(1.0 + damping * damping) - damping)
