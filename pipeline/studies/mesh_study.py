@@ -1,0 +1,353 @@
+"""Mesh, viscosity and end time of the near field against their error, over random designs.
+
+    python pipeline/studies/mesh_study.py            # about two minutes on two cores
+
+Designs are drawn from the full recipe by the dataset's own functions. Every setting is compared
+with a mesh of 1,152 zones. Cost is counted, not timed: zones in motion summed over the steps. The
+tables and figures of `pipeline/docs/mesh_study.md` are written by this script, between its marks.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from castblast.blast import BlastCase, BlastSettings, make_case
+from castblast.dataset.design import make_design
+from castblast.dataset.provenance import load_explosives
+from castblast.dataset.simulation import blast_simulator
+from castblast.errors import Status
+from castblast.explosive.isentrope import pressure
+from castblast.files import write_text
+from castblast.nearfield.march import Annulus, March, march
+from castblast.nearfield.outcome import STATE_NAMES, WINDOW, end_state, mean_over
+from castblast.nearfield.setup import EQUILIBRIUM_ZONES
+from castblast.nearfield.solver import _annulus
+from castblast.report.style import CYCLE, GREY, in_style, new_figure, save_figure
+from castblast.specs.recipe import load_recipe
+
+FloatArray: TypeAlias = NDArray[np.float64]
+Change: TypeAlias = Callable[[Annulus], Annulus]
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+PAGE = ROOT / "pipeline/docs/mesh_study.md"
+STUDY_SEED, CHECK_SEED = 7, 99
+REFERENCE_ZONES, SECOND_ZONES = 1152, 576
+#: Changes no number of the tables.
+_THREADS = 2
+#: Long runs for the end time: last windows, in units of the time at which the wall turns back.
+LONG, LATE = 6.0, (4.0, 6.0)
+WINDOWS = ((1.3, 1.8), (1.5, 1.8), (1.6, 1.9), (1.6, 2.2), (2.0, 3.0), (2.5, 3.5))
+
+#: Heading of each target and the outputs that it adds up.
+TARGETS: dict[str, tuple[str, ...]] = {
+    "pressure": ("equilibrium_pressure",),
+    "hole radius": ("expanded_hole_radius",),
+    "crushed": ("crushed_zone_radius",),
+    "intense": ("intense_shear_radius",),
+    "yield": ("plastic_zone_radius",),
+    "gas work": ("gas_work",),
+    "plastic": ("plastic_work", "tensile_work"),
+    "radiated": ("kinetic_energy", "elastic_energy", "viscous_work", "boundary_work"),
+}
+#: Limits of the dataset default: 95th percentile of the error [percent].
+LIMITS = {"pressure": 0.3, "hole radius": 0.1}
+
+
+class Setting(NamedTuple):
+    """One row of a table: what is changed, beginning from the default of the solver."""
+
+    label: str
+    change: Change
+
+
+class Outcome(NamedTuple):
+    """Targets (cases, targets), zone-steps, steps and open energy balance (cases,)."""
+
+    targets: FloatArray
+    zone_steps: FloatArray
+    steps: FloatArray
+    residual: FloatArray
+
+
+def draw_cases(size: int, seed: int) -> list[BlastCase]:
+    """Draw designs of the full recipe, all explosives equally often."""
+    source = load_recipe(ROOT / "data_specs/recipes/full.yaml", size)
+    recipe = source.recipe.model_copy(update={"seed": seed})
+    explosives = tuple(entry.spec.to_explosive() for entry in load_explosives(source))
+    simulator = blast_simulator(recipe, explosives)
+    design = make_design(recipe, simulator, "full recipe")
+    rows = [{name: float(column[i]) for name, column in design.inputs.items()} for i in range(size)]
+    return [
+        make_case(explosives[kind], row, BlastSettings())
+        for kind, row in zip(design.explosive, rows, strict=True)
+    ]
+
+
+def annuli(cases: Sequence[BlastCase], zones: int = 0) -> list[Annulus]:
+    """Annulus of every case on a mesh of so many zones, refined everywhere alike; 0: default."""
+    return [
+        _annulus(c.explosive, c.rock, c.hole, c.near_field._replace(zones=zones)) for c in cases
+    ]
+
+
+def run_all(cases: Sequence[BlastCase], setting: Setting, zones: int = 0) -> Outcome:
+    """March all cases under a setting.
+
+    Raises
+    ------
+    RuntimeError
+        A run ended without a result.
+    """
+    names = [STATE_NAMES.index(name) for parts in TARGETS.values() for name in parts]
+    groups = np.repeat(np.arange(len(TARGETS)), [len(parts) for parts in TARGETS.values()])
+
+    def one(pair: tuple[BlastCase, Annulus]) -> FloatArray:
+        case, annulus = pair
+        run = _finished(setting.change(annulus))
+        state = np.empty(len(STATE_NAMES))
+        end_state(annulus, run, float(case.explosive.total_energy), state)
+        targets = np.bincount(groups, weights=state[names])
+        residual = state[STATE_NAMES.index("energy_residual")]
+        return np.concatenate([targets, [run.zone_steps, run.steps, residual]])
+
+    with ThreadPoolExecutor(_THREADS) as pool:
+        table = np.array(list(pool.map(one, zip(cases, annuli(cases, zones), strict=True))))
+    return Outcome(table[:, :-3], table[:, -3], table[:, -2], table[:, -1])
+
+
+def _finished(annulus: Annulus) -> March:
+    run = march(annulus._replace(max_steps=5_000_000))
+    if run.status != Status.OK:
+        message = f"a run ended with status {Status(run.status).name}: {annulus}"
+        raise RuntimeError(message)
+    return run
+
+
+def table(
+    settings: Sequence[Setting], cases: Sequence[BlastCase], reference: FloatArray
+) -> tuple[list[str], list[Outcome]]:
+    """Rows of a Markdown table: cost, then median, 95th percentile and maximum of each error."""
+    head = ["setting", "1000 zone-steps", "steps", "balance", *TARGETS]
+    lines = ["| " + " | ".join(head) + " |", "|---|" + "---:|" * (len(head) - 1)]
+    outcomes = []
+    for setting in settings:
+        outcome = run_all(cases, setting)
+        outcomes.append(outcome)
+        lines.append(row(setting.label, outcome, reference))
+        print(lines[-1], flush=True)
+    return lines, outcomes
+
+
+def row(label: str, outcome: Outcome, reference: FloatArray) -> str:
+    """One row of a table; errors in percent."""
+    error = errors(outcome, reference)
+    cells = [
+        f"{np.median(e):.2f} / {np.percentile(e, 95):.2f} / {e.max():.2f}"
+        if e.max() >= 0.095
+        else f"{np.median(e):.3f} / {np.percentile(e, 95):.3f} / {e.max():.3f}"
+        for e in error.T
+    ]
+    cost = f"{outcome.zone_steps.mean() / 1e3:.0f}"
+    balance = f"{np.abs(outcome.residual).max():.0e}"
+    return (
+        f"| {label} | {cost} | {outcome.steps.mean():.0f} | {balance} | " + " | ".join(cells) + " |"
+    )
+
+
+def errors(outcome: Outcome, reference: FloatArray) -> FloatArray:
+    """Relative errors in percent, (cases, targets)."""
+    return np.asarray(100.0 * np.abs(outcome.targets / reference - 1.0))
+
+
+def keep(annulus: Annulus) -> Annulus:
+    """Change nothing."""
+    return annulus
+
+
+def with_mesh(zones: int, width: float = 1.0, reach: float = 1.0) -> Change:
+    """Other number of zones; factors on the width at the wall and on the reach."""
+
+    def change(a: Annulus) -> Annulus:
+        return a._replace(zones=zones, first_width=a.first_width * width, reach=a.reach * reach)
+
+    return change
+
+
+def uniform_width(zones: int, width: float) -> Change:
+    """Geometric mesh with the same width at the wall [hole radii] in every rock."""
+
+    def change(a: Annulus) -> Annulus:
+        return a._replace(zones=zones, first_width=width * a.inner_radius, reach=float("inf"))
+
+    return change
+
+
+def with_viscosity(linear: float, quadratic: float) -> Change:
+    """Other viscosities."""
+
+    def change(a: Annulus) -> Annulus:
+        material = a.material._replace(linear_viscosity=linear, quadratic_viscosity=quadratic)
+        return a._replace(material=material)
+
+    return change
+
+
+def window_errors(cases: Sequence[BlastCase]) -> tuple[list[str], FloatArray]:
+    """Error of the window in which the hole radius is averaged, against the late mean.
+
+    Returns
+    -------
+    lines : list of str
+        A Markdown table.
+    paths : array (cases, 60)
+        Departure of the hole radius from its late mean [percent], in steps of 0.1 from 0 to 6.
+    """
+
+    def one(pair: tuple[BlastCase, Annulus]) -> tuple[FloatArray, FloatArray]:
+        case, annulus = pair
+        run = _finished(annulus._replace(settling_factor=LONG))
+        turn, record = run.reversal_time, run.record
+        radii = [mean_over(record, a * turn, b * turn).mean for a, b in (*WINDOWS, LATE)]
+        per_charge = 4.0 / case.hole.charge_diameter**2
+        isentrope = annulus.load.isentrope
+        pressures = [pressure(isentrope, r * r * per_charge) for r in radii]
+        path = np.interp(np.arange(60) * 0.1 * turn, record[:, 0], record[:, 1])
+        return np.array([radii, pressures]), 100.0 * (path / radii[-1] - 1.0)
+
+    with ThreadPoolExecutor(_THREADS) as pool:
+        done = list(pool.map(one, zip(cases, annuli(cases, 2 * EQUILIBRIUM_ZONES), strict=True)))
+    values = np.array([pair[0] for pair in done])
+    error = 100.0 * np.abs(values[:, :, :-1] / values[:, :, -1:] - 1.0)
+    lines = ["| window [t_rev] | hole radius | pressure |", "|---|---:|---:|"]
+    for k, (start, end) in enumerate(WINDOWS):
+        cells = [
+            f"{np.median(e):.3f} / {np.percentile(e, 95):.3f} / {e.max():.3f}"
+            for e in (error[:, 0, k], error[:, 1, k])
+        ]
+        mark = " (default)" if (start, end) == tuple(WINDOW) else ""
+        lines.append(f"| {start} to {end}{mark} | {cells[0]} | {cells[1]} |")
+        print(lines[-1], flush=True)
+    return lines, np.array([pair[1] for pair in done])
+
+
+@in_style
+def draw_cost(points: dict[str, list[tuple[float, float, float]]], path: Path) -> None:
+    """95th percentile of the error over the cost, for pressure and hole radius."""
+    figure, axes = new_figure(1, 2, width=8.0, height=3.0)
+    for k, (target, limit) in enumerate(LIMITS.items()):
+        for (name, values), colour in zip(points.items(), CYCLE, strict=False):
+            cost, *error = np.array(values).T
+            axes[k].loglog(cost / 1e3, error[k], "o-", color=colour, label=name, markersize=4)
+        axes[k].axhline(limit, color=GREY, linestyle="--", linewidth=1.0)
+        axes[k].set_title(f"Error of the {target}")
+        axes[k].set_xlabel("1000 zone-steps per case")
+        axes[k].set_ylabel("95th percentile [%]")
+    axes[0].legend()
+    save_figure(figure, path, dpi=110)
+
+
+@in_style
+def draw_paths(paths: FloatArray, path: Path) -> None:
+    """Hole radius after the wall has turned back, all cases, against its late mean."""
+    figure, axes = new_figure(1, 1, width=6.0, height=3.0)
+    time = np.arange(60) * 0.1
+    axes.plot(time, paths.T, color=CYCLE[0], alpha=0.3, linewidth=0.8)
+    axes.axvspan(*WINDOW, color=CYCLE[1], alpha=0.3, label="window of the end state")
+    axes.set_xlim(0.7, LONG)
+    axes.set_ylim(-1.0, 1.0)
+    axes.set_title("Hole radius after the wall has turned back")
+    axes.set_xlabel("time over time of turning back")
+    axes.set_ylabel("departure from the late mean [%]")
+    axes.legend()
+    save_figure(figure, path, dpi=110)
+
+
+def put(page: str, name: str, lines: Sequence[str]) -> str:
+    """Replace what stands between the marks of a name."""
+    begin, end = f"<!-- begin {name} -->", f"<!-- end {name} -->"
+    before, rest = page.split(begin)
+    _, after = rest.split(end)
+    return before + begin + "\n" + "\n".join(lines) + "\n" + end + after
+
+
+def study(
+    cases: Sequence[BlastCase], check: Sequence[BlastCase], figures: Path
+) -> dict[str, list[str]]:
+    """Run everything; tables by name."""
+    default = Setting("default", keep)
+    fine = run_all(cases, default, REFERENCE_ZONES)
+    second = run_all(cases, default, SECOND_ZONES)
+    blocks: dict[str, list[str]] = {}
+    n = EQUILIBRIUM_ZONES
+    graded = {
+        z: Setting(f"{z} zones", with_mesh(z, n / z)) for z in (64, 80, 96, n, 128, 160, 208, 288)
+    }
+    blocks["zones"], by_zones = table(list(graded.values()), cases, fine.targets)
+    blocks["zones"].append(row(f"{SECOND_ZONES} zones", second, fine.targets))
+    plain = [Setting(f"{z} zones, {w:g}", uniform_width(z, w)) for z, w in
+             ((96, 0.18), (128, 0.135), (144, 0.12), (192, 0.09), (288, 0.06))]  # fmt: skip
+    blocks["geometric"], by_width = table(plain, cases, fine.targets)
+    grading = [
+        Setting(f"width x {w:g}, reach x {r:g}", with_mesh(n, w, r))
+        for w, r in (
+            (0.6, 1.0),
+            (0.8, 1.0),
+            (1.0, 1.0),
+            (1.2, 1.0),
+            (1.6, 1.0),
+            (1.0, 0.4),
+            (1.0, 3.0),
+        )
+    ]
+    blocks["grading"], _ = table(grading, cases, fine.targets)
+    viscosity = [
+        Setting(f"C_L {a:g}, C_Q {b:g}", with_viscosity(a, b))
+        for a, b in ((0.1, 1.5), (0.15, 1.5), (0.3, 1.5), (0.15, 0.75), (0.15, 3.0))
+    ]
+    blocks["viscosity"], _ = table(viscosity, cases, fine.targets)
+    courant = [Setting(f"Courant {c:g}", lambda a, c=c: a._replace(courant=c))  # type: ignore[misc]
+               for c in (0.5, 0.7, 0.95)]  # fmt: skip
+    blocks["courant"], _ = table(courant, cases, fine.targets)
+    other = run_all(check, default, SECOND_ZONES)
+    blocks["check"], _ = table([default], check, other.targets)
+    blocks["window"], paths = window_errors([*cases, *check])
+    draw_cost(
+        {
+            "default grading": [_point(o, fine.targets) for o in by_zones],
+            "geometric, same width in all rock": [_point(o, fine.targets) for o in by_width],
+        },
+        figures / "mesh_cost.png",
+    )
+    draw_paths(paths, figures / "mesh_window.png")
+    return blocks
+
+
+def _point(outcome: Outcome, reference: FloatArray) -> tuple[float, float, float]:
+    error = np.percentile(errors(outcome, reference), 95, axis=0)
+    return float(outcome.zone_steps.mean()), float(error[0]), float(error[1])
+
+
+def main() -> None:
+    """Run the study and write its page."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--cases", type=int, default=32)
+    parser.add_argument("--check", type=int, default=64)
+    parser.add_argument("--page", type=Path, default=PAGE)
+    options = parser.parse_args()
+    cases = draw_cases(options.cases, STUDY_SEED)
+    check = draw_cases(options.check, CHECK_SEED)
+    page = options.page.read_text(encoding="utf-8")
+    for name, lines in study(cases, check, options.page.parent / "figures").items():
+        page = put(page, name, lines)
+    write_text(options.page, page)
+
+
+if __name__ == "__main__":
+    main()
