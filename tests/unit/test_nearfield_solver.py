@@ -88,12 +88,15 @@ def test_gas_that_leaves_its_table_is_reported() -> None:
     assert blast(ANFO._replace(isentrope=short), hole=wide).status == Status.OUT_OF_ISENTROPE
 
 
-def test_step_limit_is_not_converged(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(solver, "_MAX_STEPS", 50)
-    result = blast()
-    assert result.status == Status.NOT_CONVERGED
-    assert result.n_steps == 50
-    assert np.isnan(result.expanded_hole_radius)
+def test_step_limit_is_not_converged() -> None:
+    case = solver._annulus(ANFO, BASE_ROCK, base_hole(), NearFieldSettings())
+    run = march_module.march(case._replace(max_steps=50))
+    assert (run.status, run.steps) == (Status.NOT_CONVERGED, 50)
+    state = np.empty(len(STATE_NAMES))
+    end_state(case, run, ANFO.total_energy, state)
+    assert state[0] == Status.NOT_CONVERGED
+    assert state[STATE_NAMES.index("n_steps")] == 50
+    assert np.isnan(state[STATE_NAMES.index("expanded_hole_radius")])
 
 
 def test_an_open_ledger_and_a_failed_return_are_statuses() -> None:
