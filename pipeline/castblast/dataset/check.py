@@ -80,7 +80,7 @@ def _attribute_faults(dataset: xr.Dataset, failed: int) -> list[Fault]:
     ]
     if attributes.get("schema", SCHEMA) != SCHEMA:
         faults.append(Fault("attribute schema", f"is '{attributes['schema']}', not '{SCHEMA}'"))
-    for name in ("dependency_versions", "explosive_specs", "made_from"):
+    for name in ("dependency_versions", "explosive_specs", "made_from", "extends"):
         try:
             json.loads(str(attributes.get(name, "{}")))
         except ValueError:
