@@ -142,8 +142,6 @@ def test_meter_adds_up_the_gaps_between_shards():
     assert meter.memory.endswith("MB, largest worker 5 MB")
 
 
-def test_peak_memory_grows_with_what_is_held():
-    before = peak_memory()
+def test_peak_memory_covers_what_is_held():
     held = np.ones(40_000_000)
-    assert peak_memory() - before > 0.8 * held.nbytes - 100e6
-    assert 50e6 < peak_memory() < 1e12
+    assert held.nbytes < peak_memory() < 1e12
