@@ -27,7 +27,12 @@ from castblast.explosive.isentrope import pressure
 from castblast.files import write_text
 from castblast.nearfield.march import Annulus, March, march
 from castblast.nearfield.outcome import STATE_NAMES, WINDOW, end_state, mean_over
-from castblast.nearfield.setup import EQUILIBRIUM_ZONES
+from castblast.nearfield.setup import (
+    EQUILIBRIUM_RADII,
+    EQUILIBRIUM_REACH,
+    EQUILIBRIUM_WIDTH,
+    EQUILIBRIUM_ZONES,
+)
 from castblast.nearfield.solver import _annulus
 from castblast.report.style import CYCLE, GREY, in_style, new_figure, save_figure
 from castblast.specs.recipe import load_recipe
@@ -76,13 +81,13 @@ class Outcome(NamedTuple):
     residual: FloatArray
 
 
-def draw_cases(size: int, seed: int) -> list[BlastCase]:
-    """Draw designs of the full recipe, all explosives equally often."""
-    source = load_recipe(ROOT / "data_specs/recipes/full.yaml", size)
+def draw_cases(size: int, seed: int, name: str = "full") -> list[BlastCase]:
+    """Draw designs of a recipe, all explosives equally often."""
+    source = load_recipe(ROOT / f"data_specs/recipes/{name}.yaml", size)
     recipe = source.recipe.model_copy(update={"seed": seed})
     explosives = tuple(entry.spec.to_explosive() for entry in load_explosives(source))
     simulator = blast_simulator(recipe, explosives)
-    design = make_design(recipe, simulator, "full recipe")
+    design = make_design(recipe, simulator, name)
     rows = [{name: float(column[i]) for name, column in design.inputs.items()} for i in range(size)]
     return [
         make_case(explosives[kind], row, BlastSettings())
@@ -199,6 +204,11 @@ def with_viscosity(linear: float, quadratic: float) -> Change:
     return change
 
 
+def with_courant(share: float) -> Change:
+    """Other share of the largest stable step."""
+    return lambda annulus: annulus._replace(courant=share)
+
+
 def window_errors(cases: Sequence[BlastCase]) -> tuple[list[str], FloatArray]:
     """Error of the window in which the hole radius is averaged, against the late mean.
 
@@ -278,46 +288,29 @@ def put(page: str, name: str, lines: Sequence[str]) -> str:
 
 
 def study(
-    cases: Sequence[BlastCase], check: Sequence[BlastCase], figures: Path
+    cases: Sequence[BlastCase], checks: dict[str, list[BlastCase]], figures: Path
 ) -> dict[str, list[str]]:
     """Run everything; tables by name."""
     default = Setting("default", keep)
+    n = EQUILIBRIUM_ZONES
     fine = run_all(cases, default, REFERENCE_ZONES)
     second = run_all(cases, default, SECOND_ZONES)
-    blocks: dict[str, list[str]] = {}
-    n = EQUILIBRIUM_ZONES
-    graded = {
-        z: Setting(f"{z} zones", with_mesh(z, n / z)) for z in (64, 80, 96, n, 128, 160, 208, 288)
-    }
-    blocks["zones"], by_zones = table(list(graded.values()), cases, fine.targets)
+    counts = sorted({64, 80, 96, n, 128, 160, 2 * n, 288})
+    blocks: dict[str, list[str]] = {"default": describe_default()}
+    blocks["zones"], by_zones = table(
+        [Setting(_default_mark(z), with_mesh(z, n / z)) for z in counts], cases, fine.targets
+    )
     blocks["zones"].append(row(f"{SECOND_ZONES} zones", second, fine.targets))
-    plain = [Setting(f"{z} zones, {w:g}", uniform_width(z, w)) for z, w in
-             ((96, 0.18), (128, 0.135), (144, 0.12), (192, 0.09), (288, 0.06))]  # fmt: skip
+    widths = ((96, 0.18), (128, 0.135), (144, 0.12), (192, 0.09), (288, 0.06))
+    plain = [Setting(f"{z} zones, {w:g}", uniform_width(z, w)) for z, w in widths]
     blocks["geometric"], by_width = table(plain, cases, fine.targets)
-    grading = [
-        Setting(f"width x {w:g}, reach x {r:g}", with_mesh(n, w, r))
-        for w, r in (
-            (0.6, 1.0),
-            (0.8, 1.0),
-            (1.0, 1.0),
-            (1.2, 1.0),
-            (1.6, 1.0),
-            (1.0, 0.4),
-            (1.0, 3.0),
-        )
-    ]
-    blocks["grading"], _ = table(grading, cases, fine.targets)
-    viscosity = [
-        Setting(f"C_L {a:g}, C_Q {b:g}", with_viscosity(a, b))
-        for a, b in ((0.1, 1.5), (0.15, 1.5), (0.3, 1.5), (0.15, 0.75), (0.15, 3.0))
-    ]
-    blocks["viscosity"], _ = table(viscosity, cases, fine.targets)
-    courant = [Setting(f"Courant {c:g}", lambda a, c=c: a._replace(courant=c))  # type: ignore[misc]
-               for c in (0.5, 0.7, 0.95)]  # fmt: skip
-    blocks["courant"], _ = table(courant, cases, fine.targets)
-    other = run_all(check, default, SECOND_ZONES)
-    blocks["check"], _ = table([default], check, other.targets)
-    blocks["window"], paths = window_errors([*cases, *check])
+    for name, settings in variations().items():
+        blocks[name], _ = table(settings, cases, fine.targets)
+    for name, others in checks.items():
+        reference = run_all(others, default, SECOND_ZONES).targets
+        lines, _ = table([Setting(f"{name}, {len(others)} designs", keep)], others, reference)
+        blocks["check"] = blocks.get("check", lines[:2]) + lines[2:]
+    blocks["window"], paths = window_errors([*cases, *checks["full"]])
     draw_cost(
         {
             "default grading": [_point(o, fine.targets) for o in by_zones],
@@ -327,6 +320,37 @@ def study(
     )
     draw_paths(paths, figures / "mesh_window.png")
     return blocks
+
+
+def describe_default() -> list[str]:
+    """Formula of the default mesh with the numbers of the solver."""
+    return [
+        f"{EQUILIBRIUM_ZONES} zones to {EQUILIBRIUM_RADII:,.0f} hole radii, of the width",
+        "",
+        f"    (first + g y) (1 + y / {EQUILIBRIUM_REACH:g})",
+        f"    first = {EQUILIBRIUM_WIDTH:g} (x^2 + 0.3^2)^(1/4) / (1 + (x / 6)^2)^(1/4)",
+        "",
+    ]
+
+
+def variations() -> dict[str, list[Setting]]:
+    """Settings that differ from the default in one thing, by table."""
+    n = EQUILIBRIUM_ZONES
+    factors = ((0.6, 1.0), (0.8, 1.0), (1.0, 1.0), (1.2, 1.0), (1.6, 1.0), (1.0, 0.4), (1.0, 3.0))
+    viscosities = ((0.1, 1.5), (0.15, 1.5), (0.3, 1.5), (0.15, 0.75), (0.15, 3.0))
+    return {
+        "grading": [
+            Setting(f"width x {w:g}, reach x {r:g}", with_mesh(n, w, r)) for w, r in factors
+        ],
+        "viscosity": [
+            Setting(f"C_L {a:g}, C_Q {b:g}", with_viscosity(a, b)) for a, b in viscosities
+        ],
+        "courant": [Setting(f"Courant {c:g}", with_courant(c)) for c in (0.5, 0.7, 0.85, 0.95)],
+    }
+
+
+def _default_mark(zones: int) -> str:
+    return f"{zones} zones" + (" (default)" if zones == EQUILIBRIUM_ZONES else "")
 
 
 def _point(outcome: Outcome, reference: FloatArray) -> tuple[float, float, float]:
@@ -342,9 +366,9 @@ def main() -> None:
     parser.add_argument("--page", type=Path, default=PAGE)
     options = parser.parse_args()
     cases = draw_cases(options.cases, STUDY_SEED)
-    check = draw_cases(options.check, CHECK_SEED)
+    checks = {name: draw_cases(options.check, CHECK_SEED, name) for name in ("full", "paper")}
     page = options.page.read_text(encoding="utf-8")
-    for name, lines in study(cases, check, options.page.parent / "figures").items():
+    for name, lines in study(cases, checks, options.page.parent / "figures").items():
         page = put(page, name, lines)
     write_text(options.page, page)
 

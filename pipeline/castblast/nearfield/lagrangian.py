@@ -298,12 +298,15 @@ def step_limit(limit: float, fastest: float, dt: float) -> float:
 def kinetic_energy(body: Body, active: int, half_kick: float) -> float:
     """Kinetic energy per radian [J/m] of the nodes in motion.
 
-    `half_kick` [s] brings their velocities to the present.
+    `half_kick` [s] brings their velocities to the present; that of the outermost node, on which a
+    boundary acts besides, is taken as it is.
     """
     total = 0.0
     for i in range(active):
         speed = body.velocity[i] + half_kick * body.force[i] * body.per_mass[i]
         total += 0.5 * body.mass[i] * speed * speed
+    if active == body.width.size:
+        total += 0.5 * body.mass[active] * body.velocity[active] ** 2
     return total
 
 
