@@ -16,6 +16,7 @@ lint: $(VENV)/.dev           ## ruff, mypy --strict, import layers
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/mypy pipeline/studies
 	$(BIN)/lint-imports
 
 format: $(VENV)/.dev

@@ -20,6 +20,7 @@ from castblast.nearfield.outcome import (
     threshold_radius,
     yield_radius,
 )
+from castblast.nearfield.setup import EQUILIBRIUM_ZONES
 from castblast.nearfield.solver import NearFieldResult, solve_near_field
 from castblast.variables import VARIABLES
 
@@ -143,7 +144,7 @@ def test_histories_have_fixed_length_and_end_at_the_end() -> None:
 def test_integers_and_numpy_numbers_are_accepted() -> None:
     case = rock(young_modulus=np.float64(2e10), ucs=100_000_000)
     result = solve_near_field(
-        ANFO, case, base_hole(), NearFieldSettings(mode=1, zones=np.int64(104))
+        ANFO, case, base_hole(), NearFieldSettings(mode=1, zones=np.int64(EQUILIBRIUM_ZONES))
     )
     assert result.equilibrium_pressure == blast().equilibrium_pressure
 

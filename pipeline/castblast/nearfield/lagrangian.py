@@ -156,7 +156,7 @@ def graded_radii(inner: float, outer: float, zones: int, first: float, reach: fl
     """
     length = outer - inner
     nodes = np.empty(zones + 1)
-    if first * zones >= length:
+    if first * (1.0 + length / reach) * zones >= length:
         for i in range(zones + 1):
             nodes[i] = inner + length * i / zones
         return nodes

@@ -37,9 +37,9 @@ EQUILIBRIUM_RADII = 1000.0
 #: Zones of the two modes, and width of those at the wall in hole radii at that number of zones;
 #: in equilibrium mode it is the factor of `_wall_width`.
 PAPER_ZONES, PAPER_WIDTH = 256, 0.04
-EQUILIBRIUM_ZONES, EQUILIBRIUM_WIDTH = 104, 0.25
+EQUILIBRIUM_ZONES, EQUILIBRIUM_WIDTH = 112, 0.2325
 #: Distance from the wall, in hole radii, over which the mesh of the equilibrium mode stays fine.
-EQUILIBRIUM_REACH = 150.0
+EQUILIBRIUM_REACH = 100.0
 #: Share of the largest stable step.
 COURANT = 0.85
 MAX_STEPS = 300_000
