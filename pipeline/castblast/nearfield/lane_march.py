@@ -232,6 +232,7 @@ def _after_kick(state: Lanes, cases: Cases) -> int:
         if active < last and abs(zones[(active - 1) * BLOCK + VELOCITY + lane]) > AT_REST * peak:
             active += 1
             state.active[lane] = active
+            state.rows[ACTIVE + lane] = active
         state.zone_steps[lane] += active
         most = max(most, active)
     return most

@@ -16,6 +16,8 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
+import numpy as np
+
 from castblast.kernel import fused_kernel, kernel, lean_kernel
 from castblast.nearfield.lagrangian import Body, FloatArray, Material, after_opening
 from castblast.nearfield.mohr_coulomb import IntArray, YieldModel, edge_return
@@ -153,8 +155,9 @@ def _strain_and_return(zones: FloatArray, lanes: FloatArray, block: int) -> int:
 
 
 @fused_kernel
-def _flow_and_resist(zones: FloatArray, lanes: FloatArray, block: int) -> None:
-    """Take over the scratch of `strain_and_return`: flow, viscosity, work and nodal forces."""
+def _flow_and_resist(zones: FloatArray, lanes: FloatArray, j: int) -> None:
+    """Take over the scratch of zone `j`: flow, viscosity, work and nodal forces."""
+    block = j * BLOCK
     for lane in range(LANES):
         here = block + lane
         d = Deformation(
@@ -193,7 +196,9 @@ def _flow_and_resist(zones: FloatArray, lanes: FloatArray, block: int) -> None:
         before = zones[here + VISCOUS]
         lanes[VISCOUS_WORK + lane] += viscous_work(d, old_width, old_mean, before, r.viscous)
         zones[here + VISCOUS] = r.viscous
-        lanes[LIMIT + lane] = min(lanes[LIMIT + lane], r.limit)
+        # A zone not yet reached does not count.
+        limit = r.limit if j < lanes[ACTIVE + lane] else np.inf
+        lanes[LIMIT + lane] = min(lanes[LIMIT + lane], limit)
         lanes[FASTEST + lane] = max(
             lanes[FASTEST + lane],
             max(abs(d.radial), abs(d.hoop)),
@@ -216,7 +221,7 @@ def update_lanes(
     for j in range(active):
         if _strain_and_return(zones, lanes, j * BLOCK) > 0:
             _return_to_edges(zones, lanes, j * BLOCK, edges, fallbacks)
-        _flow_and_resist(zones, lanes, j * BLOCK)
+        _flow_and_resist(zones, lanes, j)
 
 
 @kernel
