@@ -1,10 +1,8 @@
-"""What a muckpile looks like: its surface, how far the rock went, how much it swelled.
+"""What a muckpile looks like: its surface, cross-sections and slope.
 
 The surface is what a vertical line meets first: the highest point of any ball above a place in
 plan. Volumes and profiles follow from it. Balls have one density, so shares of mass are shares of
-ball volume. Beside the simulated throw stands the ballistic one, in which every ball flies freely
-to the floor and stays where it comes down: contacts in flight shorten the throw, sliding and
-rolling after it lengthen it.
+ball volume.
 """
 
 from __future__ import annotations
@@ -15,10 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from castblast.kernel import kernel
-from castblast.muckpile.bench import Bench, bench_volume
-from castblast.muckpile.contact import ContactLaw
-from castblast.muckpile.particles import FloatArray, Particles, centre_of_mass
-from castblast.muckpile.walls import Walls, ground_height
+from castblast.muckpile.particles import FloatArray
 
 
 class HeightField(NamedTuple):
@@ -43,51 +38,6 @@ class Profile(NamedTuple):
 
     x: FloatArray
     height: FloatArray
-
-
-class PileMetrics(NamedTuple):
-    """What a cast did to a bench.
-
-    Attributes
-    ----------
-    throw : array (3,) [m]
-        Displacement of the centre of mass.
-    block_throw : array (b, 3) [m]
-        The same for each block; NaN for a block without balls.
-    cast_fraction : float [-]
-        Share of the mass past the original face line, x > 0.
-    runout_95, runout_99 : float [m]
-        Distance from the face line that this share of the mass does not pass (per cent).
-    maximum_height : float [m]
-        Of the surface over the ground.
-    pile_volume : float [m3]
-        Between surface and ground.
-    swell : float [-]
-        Pile volume over the volume of the bench; near 1, since the bench of balls is as porous
-        as the pile.
-    rock_swell : float [-]
-        Pile volume over the solid volume of the balls, i.e. over rock without pores: the swell
-        factor of practice.
-    repose_angle : float [rad]
-        Slope of the mean profile on the side of the throw; NaN where the pile has no such side.
-    ballistic_throw : float [m]
-        Mean way along x if every ball flew freely to the floor with the velocity of its block.
-    ballistic_cast_fraction : float [-]
-        Share of the mass that would come down past the face line.
-    """
-
-    throw: FloatArray
-    block_throw: FloatArray
-    cast_fraction: float
-    runout_95: float
-    runout_99: float
-    maximum_height: float
-    pile_volume: float
-    swell: float
-    rock_swell: float
-    repose_angle: float
-    ballistic_throw: float
-    ballistic_cast_fraction: float
 
 
 def surface_height(
@@ -165,6 +115,17 @@ def section(field: HeightField, y: float) -> Profile:
     return Profile(field.x, field.height[int(np.argmin(np.abs(field.y - y)))].copy())
 
 
+def section_band(field: HeightField, low: float, high: float) -> Profile:
+    """Return the mean cross-section over low <= y < high [m]; that nearest to the middle if none.
+
+    Averaging over a few balls takes the roughness of single ones out of a section.
+    """
+    chosen = (field.y >= low) & (field.y < high)
+    if not chosen.any():
+        return section(field, 0.5 * (low + high))
+    return Profile(field.x, field.height[chosen].mean(axis=0))
+
+
 def repose_angle(profile: Profile) -> float:
     """Slope [rad] of a pile on the side of the throw.
 
@@ -189,83 +150,3 @@ def mass_quantile(value: FloatArray, radius: FloatArray, share: float) -> float:
     mass = np.cumsum(radius[order] ** 3)
     at = int(np.searchsorted(mass, share * mass[-1]))
     return float(value[order[min(at, len(order) - 1)]])
-
-
-def _ballistic(before: Particles, velocity: FloatArray, gravity: float) -> tuple[float, float]:
-    """Mean way along x [m] and share past the face of balls that fly freely to the floor."""
-    launch = np.where(before.block[:, None] >= 0, velocity[before.block], 0.0)
-    up = launch[:, 2]
-    fall = np.maximum(before.position[:, 2] - before.radius, 0.0)
-    time = (up + np.sqrt(up**2 + 2.0 * gravity * fall)) / gravity
-    way = launch[:, 0] * time
-    mass = before.radius**3
-    past = before.position[:, 0] + way > 0.0
-    return float(np.average(way, weights=mass)), float(np.average(past, weights=mass))
-
-
-def pile_metrics(
-    before: Particles,
-    after: Particles,
-    bench: Bench,
-    *,
-    block_velocity: FloatArray,
-    walls: Walls | None = None,
-    law: ContactLaw | None = None,
-    gravity: float = 9.81,
-) -> PileMetrics:
-    """Compare the pile with the bench it came from.
-
-    Parameters
-    ----------
-    before, after : Particles
-        The same balls in the same order.
-    bench : Bench
-    block_velocity : array (b, 3) [m s-1]
-        For the ballistic estimate.
-    walls : Walls, optional
-        Heights and volumes count from the walls that face up; None: from the level z = 0.
-    law : ContactLaw, optional
-        Reserved; the balls have one density, which cancels.
-    gravity : float [m s-2]
-    """
-    del law
-    mass = after.radius**3
-    blocks = len(block_velocity)
-    x = after.position[:, 0]
-    field = surface_height(after.position, after.radius, cell=0.5 * float(np.mean(after.radius)))
-    if walls is not None:
-        ground = ground_height(walls, *np.meshgrid(field.x, field.y))
-        field = field._replace(height=np.maximum(field.height - ground, 0.0))
-    area = (field.x[1] - field.x[0]) if len(field.x) > 1 else 0.0
-    area *= (field.y[1] - field.y[0]) if len(field.y) > 1 else 0.0
-    volume = float(np.sum(field.height) * area)
-    solid = 4.0 / 3.0 * np.pi * float(np.sum(mass))
-    way, past = _ballistic(before, block_velocity, gravity)
-    return PileMetrics(
-        throw=centre_of_mass(after) - centre_of_mass(before),
-        block_throw=_block_throw(before, after, blocks),
-        cast_fraction=float(np.average(x > 0.0, weights=mass)),
-        runout_95=mass_quantile(x, after.radius, 0.95),
-        runout_99=mass_quantile(x, after.radius, 0.99),
-        maximum_height=float(np.max(field.height)),
-        pile_volume=volume,
-        swell=volume / bench_volume(bench),
-        rock_swell=volume / solid,
-        repose_angle=repose_angle(mean_profile(field)),
-        ballistic_throw=way,
-        ballistic_cast_fraction=past,
-    )
-
-
-def _block_throw(before: Particles, after: Particles, blocks: int) -> FloatArray:
-    """Displacement (b, 3) [m] of the centre of mass of each block."""
-    chosen = before.block >= 0
-    group = before.block[chosen]
-    mass = before.radius[chosen] ** 3
-    way = (after.position - before.position)[chosen]
-    total = np.bincount(group, mass, minlength=blocks)
-    moved = np.column_stack(
-        [np.bincount(group, mass * way[:, axis], minlength=blocks) for axis in range(3)]
-    )
-    filled = np.where(total > 0.0, total, nan)
-    return np.asarray(moved / filled[:, None])

@@ -14,7 +14,7 @@ from castblast.kernel import source_hash
 from castblast.muckpile.bench import Bench, assign_blocks, block_shape, block_velocities
 from castblast.muckpile.packing import fill_bench, mean_radius_for_count
 from castblast.muckpile.particles import Particles, particles_at_rest
-from castblast.muckpile.profile import pile_metrics
+from castblast.muckpile.metrics import pile_metrics
 from castblast.muckpile.solver import CastCase, run_cast
 from castblast.muckpile.walls import bench_walls
 from castblast.progress import ProgressCallback, silent

@@ -14,10 +14,10 @@ import numpy as np
 from castblast.errors import Status
 from castblast.files import write_csv, write_text, write_with
 from castblast.muckpile.bench import Bench, block_shape
+from castblast.muckpile.metrics import PileMetrics
 from castblast.muckpile.particles import Particles
 from castblast.muckpile.profile import (
     HeightField,
-    PileMetrics,
     Profile,
     mean_profile,
     section,
