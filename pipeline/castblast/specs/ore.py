@@ -1,0 +1,161 @@
+"""Files of ore polygons: YAML with names, grades and corners, or CSV with one corner a line.
+
+Coordinates are metres in the frame of the bench: x in the direction of throw with the toe of the
+free face at 0 (so the bench has negative x), y along the bench.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections import Counter
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+
+from castblast.errors import SpecError, nearest_name
+from castblast.muckpile.bench import Bench
+from castblast.muckpile.ore import OrePolygon
+from castblast.specs.loading import Spec, load_spec, make_spec, read_text
+
+_COLUMNS = ("name", "x", "y")
+# Polygons drawn side by side share corners that were rounded to a centimetre.
+_OVERLAP = 0.01
+
+_Corner = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+class OrePolygonSpec(Spec):
+    """One polygon: name, corners (x, y) in m, and a grade in the unit of the user."""
+
+    name: Annotated[str, Field(min_length=1)]
+    corners: Annotated[list[_Corner], Field(min_length=3)]
+    grade: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] | None = None
+
+
+class OreSpec(Spec):
+    """Contents of a file of ore polygons."""
+
+    polygons: Annotated[list[OrePolygonSpec], Field(min_length=1)]
+    notes: str = ""
+
+
+def read_ore(path: Path, bench: Bench | None = None) -> tuple[OrePolygon, ...]:
+    """Read ore polygons from YAML, or from CSV by its suffix.
+
+    YAML holds ``polygons``, a list of ``name``, ``corners`` ([x, y] pairs) and optionally
+    ``grade``; CSV has the columns name, x, y and optionally grade, a line per corner.
+
+    Parameters
+    ----------
+    path : path
+    bench : Bench, optional
+        Polygons that lie wholly beside it are faults.
+
+    Raises
+    ------
+    SpecError
+        One line per fault: no file, unknown columns or keys, no numbers, fewer than three
+        corners, a name used twice, sides that cross, polygons that overlap or miss the bench.
+    """
+    if path.suffix.lower() == ".csv":
+        spec = make_spec(_from_csv(path), OreSpec, str(path))
+    else:
+        spec = load_spec(path, OreSpec)
+    polygons = tuple(
+        OrePolygon(
+            polygon.name,
+            _without_closing_corner(np.array(polygon.corners, dtype=np.float64)),
+            math.nan if polygon.grade is None else polygon.grade,
+        )
+        for polygon in spec.polygons
+    )
+    if faults := _shape_faults(polygons, bench):
+        raise SpecError("\n".join(f"{path}: {fault}" for fault in faults))
+    return polygons
+
+
+def _without_closing_corner(corners: Any) -> Any:
+    return corners[:-1] if len(corners) > 3 and (corners[0] == corners[-1]).all() else corners
+
+
+def _from_csv(path: Path) -> dict[str, Any]:
+    """Gather the lines of each name, in order of appearance."""
+    reader = csv.DictReader(io.StringIO(read_text(path)), skipinitialspace=True)
+    header = [name.strip().lower() for name in reader.fieldnames or []]
+    reader.fieldnames = header
+    faults = [
+        f"{path}: {name}: column is missing{nearest_name(name, header)}"
+        for name in _COLUMNS
+        if name not in header
+    ]
+    faults += [
+        f"{path}: {name}: unknown column{nearest_name(name, (*_COLUMNS, 'grade'))}"
+        for name in header
+        if name not in (*_COLUMNS, "grade")
+    ]
+    if faults:
+        raise SpecError("\n".join(faults))
+    found: dict[str, dict[str, Any]] = {}
+    for line, row in enumerate(reader, start=2):
+        name = (row["name"] or "").strip()
+        values = [_number(row.get(key), f"{path}: line {line}: {key}", faults) for key in "xy"]
+        entry = found.setdefault(name, {"name": name, "corners": [], "grade": None})
+        entry["corners"].append(values)
+        if (row.get("grade") or "").strip():
+            grade = _number(row["grade"], f"{path}: line {line}: grade", faults)
+            if entry["grade"] not in (None, grade):
+                faults.append(f"{path}: line {line}: grade: '{name}' has another grade above")
+            entry["grade"] = grade
+    if faults:
+        raise SpecError("\n".join(faults))
+    return {"polygons": list(found.values())}
+
+
+def _number(text: str | None, where: str, faults: list[str]) -> float:
+    try:
+        number = float(text or "")
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        faults.append(f"{where}: '{text or ''}' is not a number")
+    return number
+
+
+def _shape_faults(polygons: tuple[OrePolygon, ...], bench: Bench | None) -> list[str]:
+    """Say what is wrong with names, corners and places; []: nothing."""
+    import shapely
+
+    times = Counter(polygon.name for polygon in polygons)
+    faults = [f"'{name}': the name is used {n} times" for name, n in times.items() if n > 1]
+    shapes = []
+    for polygon in polygons:
+        if not np.isfinite(polygon.corners).all():
+            faults.append(f"'{polygon.name}': a corner is not a finite number")
+            continue
+        shape = shapely.Polygon(polygon.corners)
+        if not shape.is_valid or shape.area == 0.0:
+            reason = shapely.is_valid_reason(shape) if shape.convex_hull.area else "no area"
+            faults.append(f"'{polygon.name}': is no simple polygon ({reason})")
+            continue
+        shapes.append((polygon.name, shape))
+        if bench is not None and not shape.intersects(_plan(bench)):
+            faults.append(
+                f"'{polygon.name}': lies beside the bench, which has x from {-bench.width:g} to "
+                f"0 m and y from 0 to {bench.length:g} m"
+            )
+    for k, (name, shape) in enumerate(shapes):
+        for other, beside in shapes[:k]:
+            common = shape.intersection(beside).area
+            if common > _OVERLAP * min(shape.area, beside.area):
+                faults.append(f"'{other}' and '{name}' overlap by {common:.3g} m2")
+    return faults
+
+
+def _plan(bench: Bench) -> Any:
+    import shapely
+
+    return shapely.box(-bench.width, 0.0, 0.0, bench.length)
