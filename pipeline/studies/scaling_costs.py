@@ -38,7 +38,7 @@ from castblast.dataset.simulation import BatchResult, FloatArray
 _SHORT_SHARD = 256
 _REPEATS = 15
 #: Samples of the builds that are compared.
-_WIDE, _LONG = 40_000, 240_000
+_WIDE, _LONG = 40_000, 160_000
 _WARM = """
 import time
 import distributed.worker

@@ -35,9 +35,9 @@ PARTS = (1, 10, 100)
 CHECKS = (
     Order(8_000, 500, 1e-3, 2),
     Order(9_000, 1000, 1e-3, 2),
-    Order(32_000, 500, 1e-3, 8),
+    Order(16_000, 500, 2e-3, 8),
     Order(21_000, 1000, 2e-3, 8),
-    Order(96_000, 500, 1e-3, 32),
+    Order(48_000, 500, 4e-3, 32),
     Order(34_000, 250, 4e-3, 32),
 )
 _THREADS = "threads of one process"

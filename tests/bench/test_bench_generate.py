@@ -1,0 +1,100 @@
+"""Speed of `castblast generate` on the full recipe, physics and file included.
+
+Kernels are loaded before; what a stand-in for the physics shows is in `test_bench_dataset.py`.
+"""
+
+import re
+import time
+
+import pytest
+
+import castblast.burden.batch
+import castblast.nearfield.batch
+from castblast.dataset.design import make_design
+from castblast.dataset.provenance import load_explosives
+from castblast.dataset.simulation import blast_simulator
+from castblast.specs.recipe import load_recipe
+from castblast.stages.generate import generate
+
+ROWS = 4000
+DESIGN_ROWS = 100_000
+#: Samples per second that give 10,000 in 30 s, and a million in 50 minutes.
+RATE = 10_000 / 30
+SECONDS: dict[int, float] = {}
+
+
+@pytest.fixture(scope="module")
+def recipe(repository):
+    return repository / "data_specs" / "recipes" / "full.yaml"
+
+
+@pytest.fixture(scope="module")
+def make_rows(recipe):
+    """Simulator and design of so many rows."""
+
+    def make(rows):
+        source = load_recipe(recipe, rows)
+        explosives = tuple(entry.spec.to_explosive() for entry in load_explosives(source))
+        simulator = blast_simulator(source.recipe, explosives)
+        return simulator, make_design(source.recipe, simulator, "full")
+
+    return make
+
+
+@pytest.mark.benchmark(group=f"generate, {ROWS} rows of the full recipe")
+@pytest.mark.parametrize("workers", [1, 2])
+def test_generate(benchmark, recipe, make_rows, tmp_path, figure, workers):
+    """Marks: 10,000 samples in 30 s on two cores; less than 3 % of the time for scheduling."""
+    simulator, design = make_rows(1)
+    simulator.run(design.inputs, design.explosive)
+    outcome = benchmark.pedantic(
+        generate, (recipe, tmp_path), {"size": ROWS, "workers": workers}, rounds=1
+    )
+    seconds = SECONDS[workers] = benchmark.stats.stats.min
+    mark = {"at_least": round(RATE)} if workers == 2 else {}
+    figure(f"generate, {workers} worker{'s'[: workers - 1]}", ROWS / seconds, "samples/s", **mark)
+    share = float(re.search(r"scheduling ([\d.]+)%", "\n".join(outcome.lines))[1])
+    figure(f"generate, {workers} worker{'s'[: workers - 1]}: scheduling", share, "%", at_most=3.0)
+    if workers == 2 and 1 in SECONDS:
+        figure("generate: speed of 2 workers over 1", SECONDS[1] / seconds)
+
+
+@pytest.mark.benchmark(group="generate, parts")
+def test_python_around_kernels(benchmark, make_rows, figure, monkeypatch):
+    """Mark: at most 20 us a row for everything in a shard that is not a kernel."""
+    simulator, design = make_rows(1000)
+    inside = []
+
+    def timed(kernel):
+        def run(*arguments):
+            begin = time.perf_counter()
+            result = kernel(*arguments)
+            inside.append(time.perf_counter() - begin)
+            return result
+
+        return run
+
+    for module, name in (
+        (castblast.nearfield.batch, "march_many"),
+        (castblast.burden.batch, "_solve_rows"),
+    ):
+        monkeypatch.setattr(module, name, timed(getattr(module, name)))
+    simulator.run(
+        {name: values[:9] for name, values in design.inputs.items()}, design.explosive[:9]
+    )
+    inside.clear()
+    benchmark.pedantic(simulator.run, (design.inputs, design.explosive), rounds=1)
+    seconds = benchmark.stats.stats.min
+    figure(
+        "Python around the kernels", 1e6 * (seconds - sum(inside)) / 1000, "us/row", at_most=20.0
+    )
+    if 1 in SECONDS:
+        share = 100.0 * (1.0 - ROWS * seconds / 1000 / SECONDS[1])
+        figure("generate, 1 worker: all that is not physics", share, "%")
+
+
+@pytest.mark.benchmark(group="generate, parts")
+def test_design(benchmark, make_rows, figure):
+    """Mark: at most 20 us a row."""
+    benchmark.pedantic(make_rows, (DESIGN_ROWS,), rounds=1)
+    figure("design", 1e6 * benchmark.stats.stats.min / DESIGN_ROWS, "us/row", at_most=20.0)
