@@ -80,7 +80,7 @@ def test_packing_stays_at_rest_behind_its_walls(packing):
     )  # fmt: skip
     balls = packing.particles._replace(block=np.full(len(packing.particles.radius), -1))
     case = CastCase(
-        balls, ContactLaw(), walls, np.empty(0), np.empty((0, 3)), max_time=0.5, min_time=0.5,
+        balls, ContactLaw(), walls, np.empty(0), np.empty((0, 3)), max_time=1.0, min_time=1.0,
         threads=1,
     )  # fmt: skip
     result = run_cast(case)

@@ -1,7 +1,7 @@
 """Fill a bench with balls and let them come to rest, before anything is fired.
 
-Radii are drawn evenly from mean (1 - d) to mean (1 + d) until they fill the stated share of the
-bench, centres at random in a taller one. Overlaps are pushed apart without forces; then gravity
+Radii are drawn from the distribution asked for until they fill the stated share of the bench,
+centres at random in a taller one. Overlaps are pushed apart without forces; then gravity
 and the contact law act, and the packing settles between frictionless walls (so that the silo
 effect of Janssen (1895) leaves no trace), braked by a drag that damps its slowest vibration. The
 outcome depends on the seed only. Left out: joints and blocks of rock; the bench is rubble of the
@@ -10,24 +10,42 @@ stated solid fraction, which is what the published discrete-element models fire 
 
 from __future__ import annotations
 
-from math import cos, exp, inf, pi, sin, sqrt
+from math import exp, inf, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from castblast.errors import Status
-from castblast.muckpile.bench import Bench, assign_blocks, bench_volume, check_bench, crest_position
-from castblast.muckpile.contact import ContactLaw
-from castblast.muckpile.particles import (
-    FloatArray,
-    Particles,
-    particles_at_rest,
+from castblast.muckpile.bench import (
+    Bench,
+    assign_blocks,
+    bench_outline,
+    bench_volume,
+    check_bench,
 )
+from castblast.muckpile.contact import ContactLaw
+from castblast.muckpile.enclosure import holding_walls, parting_planes
+from castblast.muckpile.outline import (
+    depth_inside,
+    is_convex,
+    outline_volume,
+    polygon_area,
+    section_at,
+    shrink,
+)
+from castblast.muckpile.particles import FloatArray, Particles, particles_at_rest
 from castblast.muckpile.porosity import solid_fraction
 from castblast.muckpile.separation import push_apart
 from castblast.muckpile.simulation import Simulation
+from castblast.muckpile.sizes import (
+    Sizes,
+    draw_radii,
+    mean_ball_volume,
+    sauter_radius,
+    scaled,
+    uniform_sizes,
+)
 from castblast.muckpile.threads import thread_count
-from castblast.muckpile.walls import Walls, join, plane
 from castblast.progress import ProgressCallback, silent
 
 #: Solid fractions that random packings of rough balls can have at rest under gravity.
@@ -37,12 +55,12 @@ _APART, _MOST_SWEEPS = 0.01, 2000
 #: Solid fraction after settling = _SETTLED + _COMPACTION (that before - _LOOSE): fitted by this
 #: project to packings with friction and rolling friction of 0.5.
 _LOOSE, _SETTLED, _COMPACTION = 0.50, 0.570, 0.586
-#: Rest: kinetic energy over mass x gravity x mean radius.
-_REST = 2e-4
+#: Rest: kinetic energy over mass x gravity x Sauter radius (mean cube over mean square).
+_REST = 1.7e-4
 #: Simulated time [s]: between two looks at a settling packing, and at most.
 _LOOK, _LONGEST_SETTLING = 0.01, 6.0
-#: Over the mean radius: the layer at floor, ends, rear and face that balls do not fill.
-_WALL_LAYER = 0.5
+#: Over the Sauter radius: the layer at floor and sides that balls do not fill.
+_WALL_LAYER = 0.433
 
 
 class Packing(NamedTuple):
@@ -79,35 +97,37 @@ def estimate_count(
     solid_fraction: float = 0.60,
 ) -> int:
     """Number of balls that fill `bench`; radii even in mean_radius (1 -+ relative_deviation)."""
-    mean_volume = _ball_volume(mean_radius, relative_deviation)
-    return round(solid_fraction * _filled_volume(bench, mean_radius) / mean_volume)
+    return count_of(bench, uniform_sizes(mean_radius, relative_deviation), solid_fraction)
 
 
-def _filled_volume(bench: Bench, mean_radius: float) -> float:
-    """Volume [m3] that a packing fills: balls pack loosely along walls."""
-    layer = _WALL_LAYER * mean_radius
-    shares = (
-        1.0 - 2.0 * layer / bench.length,
-        1.0 - 2.0 * layer / (bench.width + 0.5 * crest_position(bench)),
-        1.0 - layer / bench.height,
-    )
-    return bench_volume(bench) * float(np.prod(shares))
+def count_of(bench: Bench, sizes: Sizes, solid_fraction: float = 0.60) -> int:
+    """Number of balls of these `sizes` that fill `bench`."""
+    return round(solid_volume(bench, sizes, solid_fraction) / mean_ball_volume(sizes))
+
+
+def solid_volume(bench: Bench, sizes: Sizes, solid_fraction: float = 0.60) -> float:
+    """Volume [m3] of the balls that fill `bench`: along walls they pack loosely."""
+    layer = _WALL_LAYER * sauter_radius(sizes)
+    inner = shrink(bench_outline(bench), layer)
+    return solid_fraction * outline_volume(inner, bench.height) * (1.0 - layer / bench.height)
 
 
 def mean_radius_for_count(
     bench: Bench, count: int, relative_deviation: float = 0.5, solid_fraction: float = 0.60
 ) -> float:
-    """Mean radius [m] with which about `count` balls fill `bench`."""
-    unit = count * _ball_volume(1.0, relative_deviation)
-    radius = float((solid_fraction * bench_volume(bench) / unit) ** (1.0 / 3.0))
+    """Mean radius [m] with which about `count` balls fill `bench`; radii even around it."""
+    unit = uniform_sizes(1.0, relative_deviation)
+    return float(sizes_for_count(bench, unit, count, solid_fraction).radius.mean())
+
+
+def sizes_for_count(bench: Bench, sizes: Sizes, count: int, solid_fraction: float = 0.60) -> Sizes:
+    """Scale `sizes` so that about `count` balls fill `bench`."""
+    unit = count * mean_ball_volume(sizes)
+    factor = float((solid_fraction * bench_volume(bench) / unit) ** (1.0 / 3.0))
     for _ in range(20):
-        radius = float((solid_fraction * _filled_volume(bench, radius) / unit) ** (1.0 / 3.0))
-    return radius
-
-
-def _ball_volume(mean_radius: float, deviation: float) -> float:
-    """Mean volume [m3] of a ball; the mean of R^3 of an even distribution is R^3 (1 + d^2)."""
-    return 4.0 / 3.0 * np.pi * mean_radius**3 * (1.0 + deviation**2)
+        fill = solid_volume(bench, scaled(sizes, factor), solid_fraction)
+        factor = float((fill / unit) ** (1.0 / 3.0))
+    return scaled(sizes, factor)
 
 
 def check_packing(
@@ -117,25 +137,46 @@ def check_packing(
     faults = check_bench(bench)
     if not 0.0 <= relative_deviation < 1.0:
         faults.append(f"relative_deviation = {relative_deviation:g}: must be in 0 to 1, below 1")
-    if not LOOSEST <= solid_fraction <= DENSEST:
-        faults.append(
-            f"solid_fraction = {solid_fraction:g}: a random packing of balls at rest has "
-            f"{LOOSEST} to {DENSEST}"
-        )
+    faults += _fraction_faults(solid_fraction)
+    return faults + _size_faults(
+        bench, mean_radius * (1.0 + relative_deviation), f"mean_radius = {mean_radius:g} m"
+    )
+
+
+def check_sizes(bench: Bench, sizes: Sizes, solid_fraction: float) -> list[str]:
+    """As `check_packing`, for any distribution of sizes."""
+    largest = float(sizes.radius[-1])
+    shown = f"largest diameter {2.0 * largest:.3g} m"
+    return (
+        check_bench(bench) + _fraction_faults(solid_fraction) + _size_faults(bench, largest, shown)
+    )
+
+
+def _fraction_faults(solid_fraction: float) -> list[str]:
+    if LOOSEST <= solid_fraction <= DENSEST:
+        return []
+    return [
+        f"solid_fraction = {solid_fraction:g}: a random packing of balls at rest has "
+        f"{LOOSEST} to {DENSEST}"
+    ]
+
+
+def _size_faults(bench: Bench, largest: float, shown: str) -> list[str]:
     smallest = min(bench.length, bench.width, bench.height)
-    if not 0.0 < mean_radius * (1.0 + relative_deviation) <= 0.25 * smallest:
-        faults.append(
-            f"mean_radius = {mean_radius:g} m: the largest ball must fit at least twice into the "
-            f"shortest side of the bench, {smallest:g} m"
-        )
-    return faults
+    if 0.0 < largest <= 0.25 * smallest:
+        return []
+    return [
+        f"{shown}: the largest ball must fit at least twice into the shortest side of the bench, "
+        f"{smallest:g} m"
+    ]
 
 
 def fill_bench(
     bench: Bench,
     *,
-    mean_radius: float,
+    mean_radius: float = 0.0,
     relative_deviation: float = 0.5,
+    sizes: Sizes | None = None,
     solid_fraction: float = 0.60,
     seed: int = 0,
     law: ContactLaw | None = None,
@@ -147,9 +188,12 @@ def fill_bench(
     Parameters
     ----------
     bench : Bench
+        A rectangle or any polygon in plan, with leaning faces.
     mean_radius : float [m]
     relative_deviation : float [-]
         Radii are even in mean_radius (1 -+ relative_deviation).
+    sizes : Sizes, optional
+        Any other distribution; instead of the two before.
     solid_fraction : float [-]
         Volume of the balls over that of the bench inside of it, 0.55 to 0.63; near floor and
         walls a packing is looser.
@@ -162,61 +206,62 @@ def fill_bench(
     Raises
     ------
     ValueError
-        See `check_packing`; the message names every fault.
+        See `check_packing` and `check_sizes`; the message names every fault.
     """
-    faults = check_packing(bench, mean_radius, relative_deviation, solid_fraction)
+    if sizes is None:
+        faults = check_packing(bench, mean_radius, relative_deviation, solid_fraction)
+        sizes = uniform_sizes(mean_radius, relative_deviation)
+    else:
+        faults = check_sizes(bench, sizes, solid_fraction)
     if faults:
         raise ValueError("; ".join(faults))
     law = law or ContactLaw()
     rng = np.random.default_rng(seed)
-    count = estimate_count(bench, mean_radius, relative_deviation, solid_fraction)
-    radius = mean_radius * rng.uniform(1 - relative_deviation, 1 + relative_deviation, count)
+    radius = draw_radii(sizes, count_of(bench, sizes, solid_fraction), rng)
     # The sample is brought to the exact solid volume; the factor differs from 1 by chance only.
     solid = 4.0 / 3.0 * np.pi * float(np.sum(radius**3))
-    filled = _filled_volume(bench, mean_radius)
-    radius *= (solid_fraction * filled / solid) ** (1.0 / 3.0)
+    radius *= (solid_volume(bench, sizes, solid_fraction) / solid) ** (1.0 / 3.0)
     before = _LOOSE + (solid_fraction - _SETTLED) / _COMPACTION
-    taller = bench._replace(height=bench.height * solid_fraction / before)
+    taller = _heightened(bench, solid_fraction / before)
+    body = None if is_convex(bench_outline(bench)) else bench_outline(bench)
     with thread_count(threads) as number:
         position = push_apart(
             _scatter(taller, radius, rng),
             radius,
-            _box(taller, lid=True),
+            parting_planes(taller),
             _APART,
             _MOST_SWEEPS,
             lambda share, line: progress(0.2 * share, line),
+            body,
         )
         return _settle(particles_at_rest(position, radius), bench, law, number, progress)
 
 
+def _heightened(bench: Bench, factor: float) -> Bench:
+    """The same sides, so high that the bench holds `factor` times its volume."""
+    outline = bench_outline(bench)
+    wanted = factor * bench_volume(bench)
+    height = bench.height * factor
+    for _ in range(30):
+        top = polygon_area(section_at(outline, height))
+        if top <= 0.0:
+            message = "the faces lean back so far that balls cannot be poured between them"
+            raise ValueError(message)
+        height += (wanted - outline_volume(outline, height)) / top
+    return bench._replace(height=height)
+
+
 def _scatter(bench: Bench, radius: FloatArray, rng: np.random.Generator) -> FloatArray:
     """Centres (n, 3) at random in the bench, each at least its radius away from all sides."""
+    outline = bench_outline(bench)
     box_low = np.array([-bench.width, 0.0, 0.0]) + radius[:, None]
     box_high = np.array([0.0, bench.length, bench.height]) - radius[:, None]
     position = np.empty((len(radius), 3))
     todo = np.arange(len(radius))
     while len(todo):
         position[todo] = rng.uniform(box_low[todo], box_high[todo])
-        todo = todo[_face_distance(bench, position[todo]) < radius[todo]]
+        todo = todo[depth_inside(outline, position[todo]) < radius[todo]]
     return position
-
-
-def _face_distance(bench: Bench, position: FloatArray) -> FloatArray:
-    """Distance (n,) [m] of points (n, 3) behind the free face."""
-    return -(position[:, 0] * sin(bench.face_angle) + position[:, 2] * cos(bench.face_angle))
-
-
-def _box(bench: Bench, *, lid: bool) -> Walls:
-    """Frictionless walls on all sides of the bench; only the floor has friction."""
-    face = (-sin(bench.face_angle), 0.0, -cos(bench.face_angle))
-    sides = join(
-        plane((0, 0, 0), (0, 0, 1)),
-        plane((0, 0, 0), face, 0.0),
-        plane((-bench.width, 0, 0), (1, 0, 0), 0.0),
-        plane((0, 0, 0), (0, 1, 0), 0.0),
-        plane((0, bench.length, 0), (0, -1, 0), 0.0),
-    )
-    return join(sides, plane((0, 0, bench.height), (0, 0, -1), 0.0)) if lid else sides
 
 
 def _settle(
@@ -226,14 +271,15 @@ def _settle(
     run = Simulation(
         apart,
         law,
-        _box(bench, lid=False),
+        holding_walls(bench, float(np.mean(apart.radius))),
         np.zeros(len(apart.radius), dtype=np.bool_),
         ballistic=False,
         threads=threads,
         keep_ledger=False,
     )
     weight = 4.0 / 3.0 * np.pi * law.density * float(np.sum(apart.radius**3)) * 9.81
-    limit = _REST * weight * float(np.mean(apart.radius))
+    sauter = float(np.sum(apart.radius**3) / np.sum(apart.radius**2))
+    limit = _REST * weight * sauter
     brake = exp(-2.0 * _slowest_vibration(bench, law) * _LOOK)
     status = Status.NOT_CONVERGED
     while run.clock < _LONGEST_SETTLING:

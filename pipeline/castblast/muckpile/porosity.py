@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from math import cos, sin
-
 import numpy as np
+from numpy.typing import NDArray
 
 from castblast.kernel import kernel
-from castblast.muckpile.bench import Bench, crest_position
+from castblast.muckpile.bench import Bench, bench_outline, crest_position
+from castblast.muckpile.outline import depth_inside, polygon_area, section_at
 from castblast.muckpile.particles import FloatArray, Particles
+
+#: Most nodes of the lattice, and its spacing over the mean radius where fewer are enough.
+_MOST_NODES, _FINE = 3e6, 0.2871
 
 
 def solid_fraction(particles: Particles, bench: Bench, margin: float = 0.0) -> float:
@@ -23,42 +26,58 @@ def solid_fraction(particles: Particles, bench: Bench, margin: float = 0.0) -> f
 
     Notes
     -----
-    Counts the nodes of a lattice (about seven to the mean diameter) that lie in a ball.
+    Counts the nodes of a lattice (about seven to the mean diameter, three million at most) that
+    lie in a ball.
     """
     radius = particles.radius
     mean = float(np.mean(radius))
     top = float(np.quantile(particles.position[:, 2] + radius, 0.99))
-    sides = min(bench.length, bench.width + crest_position(bench), top)
-    keep = margin or min(4.0 * mean, 0.25 * sides)
+    keep = margin or min(4.0 * mean, 0.25 * min(_narrowest(bench), top))
     low = np.array([-bench.width + keep, keep, keep])
     high = np.array([-keep, bench.length - keep, top - keep])
-    size = np.maximum(np.ceil((high - low) / (0.2871 * mean)), 1.0).astype(np.int64)
+    finest = (float(np.prod(high - low)) / _MOST_NODES) ** (1.0 / 3.0)
+    size = np.maximum(np.ceil((high - low) / max(_FINE * mean, finest)), 1.0).astype(np.int64)
     spacing = (high - low) / size
-    face = np.array([float(sin(bench.face_angle)), float(cos(bench.face_angle)), keep])
     first = low + 0.5 * spacing
-    covered, nodes = _count_nodes(particles.position, radius, first, spacing, size, face)
-    return covered / max(nodes, 1)
+    inside = _nodes_inside(bench, first, spacing, size, keep)
+    covered = _count_covered(particles.position, radius, first, spacing, inside)
+    return covered / max(int(inside.sum()), 1)
+
+
+def _narrowest(bench: Bench) -> float:
+    """Shortest side [m] of the bench in plan; of a polygon twice its area over its perimeter."""
+    if not bench.corners:
+        return min(bench.length, bench.width + crest_position(bench))
+    top = section_at(bench_outline(bench), bench.height)
+    perimeter = float(np.sum(np.linalg.norm(np.roll(top, -1, axis=0) - top, axis=1)))
+    return 2.0 * polygon_area(top) / perimeter
+
+
+def _nodes_inside(
+    bench: Bench, first: FloatArray, spacing: FloatArray, size: NDArray[np.int64], keep: float
+) -> NDArray[np.bool_]:
+    """Lattice nodes (nx, ny, nz) that lie deep enough in the bench."""
+    outline = bench_outline(bench)
+    x, y, z = (first[axis] + spacing[axis] * np.arange(size[axis]) for axis in range(3))
+    plan = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    inside = np.empty(tuple(size), dtype=np.bool_)
+    for k, height in enumerate(z):
+        level = np.column_stack([plan, np.full(len(plan), height)])
+        inside[:, :, k] = (depth_inside(outline, level) >= keep - 1e-9).reshape(size[0], size[1])
+    return inside
 
 
 @kernel
-def _count_nodes(
+def _count_covered(
     position: FloatArray,
     radius: FloatArray,
     low: FloatArray,
     spacing: FloatArray,
-    size: np.ndarray[tuple[int], np.dtype[np.int64]],
-    face: FloatArray,
-) -> tuple[int, int]:
-    """Lattice nodes in balls, and all of them, far enough behind the face (sine, cosine, margin).
-
-    Balls hardly overlap, so each node is counted for each ball.
-    """
-    covered, nodes = 0, 0
-    for i in range(size[0]):
-        for k in range(size[2]):
-            x, z = low[0] + i * spacing[0], low[2] + k * spacing[2]
-            if -x * face[0] - z * face[1] >= face[2]:
-                nodes += size[1]
+    inside: NDArray[np.bool_],
+) -> int:
+    """Number of the nodes `inside` that lie in a ball, once for each ball: they hardly overlap."""
+    covered = 0
+    size = inside.shape
     first, last = np.empty(3, np.int64), np.empty(3, np.int64)
     for n in range(len(radius)):
         for axis in range(3):
@@ -67,14 +86,11 @@ def _count_nodes(
             first[axis] = max(int(np.ceil(middle - reach)), 0)
             last[axis] = min(int(np.floor(middle + reach)), size[axis] - 1)
         for i in range(first[0], last[0] + 1):
-            x = low[0] + i * spacing[0]
-            for k in range(first[2], last[2] + 1):
-                z = low[2] + k * spacing[2]
-                if -x * face[0] - z * face[1] < face[2]:
-                    continue
-                square = (x - position[n, 0]) ** 2 + (z - position[n, 2]) ** 2
-                for j in range(first[1], last[1] + 1):
-                    y = low[1] + j * spacing[1]
-                    if square + (y - position[n, 1]) ** 2 < radius[n] ** 2:
+            x = low[0] + i * spacing[0] - position[n, 0]
+            for j in range(first[1], last[1] + 1):
+                y = low[1] + j * spacing[1] - position[n, 1]
+                for k in range(first[2], last[2] + 1):
+                    z = low[2] + k * spacing[2] - position[n, 2]
+                    if inside[i, j, k] and x * x + y * y + z * z < radius[n] ** 2:
                         covered += 1
-    return covered, nodes
+    return covered

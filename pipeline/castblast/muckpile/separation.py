@@ -1,9 +1,9 @@
 """Push overlapping balls apart, pair by pair, without forces or time.
 
 Each pair is moved apart by its overlap, half each, in the order of the cells, sweep after sweep
-(Gauss-Seidel), and every ball is put back inside the planes. Below the density of random close
-packing this ends without overlaps. It replaces the growth of radii (Lubachevsky and Stillinger
-1990), which needs many more sweeps.
+(Gauss-Seidel), and every ball is put back inside the planes, or into the section of a body. Below
+the density of random close packing this ends without overlaps. It replaces the growth of radii
+(Lubachevsky and Stillinger 1990), which needs many more sweeps.
 """
 
 from __future__ import annotations
@@ -22,12 +22,14 @@ from castblast.muckpile.neighbours import (
     sort_by_cell,
     starts,
 )
+from castblast.muckpile.outline import Outline
 from castblast.muckpile.particles import FloatArray, IntArray
 from castblast.muckpile.walls import Walls
 from castblast.progress import ProgressCallback, silent
 
 #: Over the mean radius: skin of the pair list.
 _SKIN = 0.4
+_NO_SIDES = np.empty((0, 5))
 
 
 def push_apart(
@@ -37,6 +39,7 @@ def push_apart(
     tolerance: float = 0.01,
     most_sweeps: int = 2000,
     progress: ProgressCallback = silent,
+    body: Outline | None = None,
 ) -> FloatArray:
     """Return centres (n, 3) [m] without overlaps of more than `tolerance` mean radii.
 
@@ -49,7 +52,10 @@ def push_apart(
     most_sweeps : int
         What is reached by then is returned.
     progress : callable
+    body : Outline, optional
+        Sides that hold the balls besides the planes; corners may point inwards.
     """
+    sides = _NO_SIDES if body is None else np.column_stack([body.corner, body.lean, body.sine])
     mean = float(np.mean(radius))
     place = np.column_stack([position, radius])
     identity = np.arange(len(radius))
@@ -70,6 +76,7 @@ def push_apart(
             partner,
             planes.origin,
             planes.normal,
+            sides,
             0.5 * _SKIN * mean,
             tolerance * mean,
             most_sweeps - sweeps,
@@ -91,12 +98,43 @@ def _as_balls(place: FloatArray, identity: IntArray) -> Balls:
 
 
 @kernel
+def _put_inside(place: FloatArray, i: int, sides: FloatArray) -> float:
+    """Move ball `i` level into the section at its height; return by how much it stood out [m].
+
+    Rows of `sides`: corner (2), its way per height (2), sine of the edge that begins there.
+    """
+    x, y, z = place[i, 0], place[i, 1], place[i, 2]
+    count = len(sides)
+    nearest, near_x, near_y, sine, inside = np.inf, x, y, 1.0, False
+    for k in range(count):
+        n = (k + 1) % count
+        ax, ay = sides[k, 0] + z * sides[k, 2], sides[k, 1] + z * sides[k, 3]
+        bx, by = sides[n, 0] + z * sides[n, 2], sides[n, 1] + z * sides[n, 3]
+        ex, ey = bx - ax, by - ay
+        along = min(max(((x - ax) * ex + (y - ay) * ey) / (ex * ex + ey * ey), 0.0), 1.0)
+        px, py = ax + along * ex, ay + along * ey
+        distance = sqrt((x - px) ** 2 + (y - py) ** 2)
+        if distance < nearest:
+            nearest, near_x, near_y, sine = distance, px, py, sides[k, 4]
+        if (ay > y) != (by > y) and x < ax + (y - ay) * ex / ey:
+            inside = not inside
+    signed = nearest if inside else -nearest
+    depth = place[i, 3] / sine - signed
+    if depth <= 0.0 or nearest == 0.0:
+        return 0.0
+    place[i, 0] += depth * (x - near_x) / signed
+    place[i, 1] += depth * (y - near_y) / signed
+    return float(depth * sine)
+
+
+@kernel
 def _sweep(
     place: FloatArray,
     start: IntArray,
     partner: NDArray[np.int32],
     origin: FloatArray,
     normal: FloatArray,
+    sides: FloatArray,
     allowed: float,
     tolerance: float,
     most: int,
@@ -136,6 +174,8 @@ def _sweep(
                     largest = max(largest, depth)
                     for axis in range(3):
                         place[i, axis] += depth * normal[k, axis]
+            if len(sides) > 0:
+                largest = max(largest, _put_inside(place, i, sides))
             moved = 0.0
             for axis in range(3):
                 moved += (place[i, axis] - first[i, axis]) ** 2
