@@ -20,13 +20,18 @@ SMALL: dict[str, Any] = {
     "balls": {"count": 250},
 }
 FILES = (
+    "blocks.csv",
     "energy.png",
     "final_state.npz",
     "history.csv",
     "metrics.json",
+    "movement.png",
     "plan.png",
     "profile.csv",
+    "profiles.png",
     "section.png",
+    "sections.png",
+    "view.png",
 )
 
 
@@ -54,10 +59,10 @@ def test_every_file_is_written(run: tuple[Path, Path, dict[str, Any]]) -> None:
     assert sorted(p.name for p in out.iterdir() if p.name != "packing.npz") == list(FILES)
     stored = json.loads((out / "metrics.json").read_text())
     assert stored["throw"] == document["throw"]
-    for name in ("profile.csv", "history.csv"):
+    for name in ("profile.csv", "history.csv", "blocks.csv"):
         table = np.loadtxt(out / name, delimiter=",", skiprows=1)
         assert np.isfinite(table).all()
-    for name in ("section.png", "plan.png", "energy.png"):
+    for name in (name for name in FILES if name.endswith(".png")):
         assert (out / name).read_bytes().startswith(b"\x89PNG")
 
 

@@ -1,113 +1,35 @@
-"""Pictures of a muckpile: cross-section, plan, and energy over time. Lengths are to scale.
+"""Pictures of a muckpile: cross-sections, plan, and energy over time. Lengths are to scale.
 
-A ball keeps the colour of the block it came from: the hue tells the row, counted from the face;
-neighbouring columns differ in lightness. Balls without a block are grey.
+Balls are coloured by the blocks they came from; all that are not hidden are painted.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib import colormaps
-from matplotlib.collections import EllipseCollection
-from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
-from castblast.muckpile.bench import Bench, block_shape, crest_position
+from castblast.muckpile.bench import Bench, crest_position
 from castblast.muckpile.particles import Particles
+from castblast.report.ball_picture import PLAN_X, PLAN_Y, SECTION, Canvas
+from castblast.report.blocks import (
+    WIDTH,
+    block_colours,
+    block_legend,
+    left_out_words,
+    shown_range,
+)
+from castblast.report.ground import INK, draw_ground_line
 from castblast.report.style import BLUE, GREEN, GREY, ORANGE, RED, in_style, new_figure, save_figure
 
 if TYPE_CHECKING:
     from castblast.muckpile.profile import Profile
-    from castblast.muckpile.solver import CastHistory
+    from castblast.muckpile.solver import CastHistory, EnergyLedger
+    from castblast.muckpile.walls import Walls
 
-_Colours = NDArray[np.float64]
-_GREY = (0.62, 0.62, 0.62, 1.0)
-_INK = "#222222"
-_WIDTH = 10.0
-_MARGIN = 0.03
-_SHOWN = 0.997  # share of the balls that a picture has to hold; single far rollers stretch it
-
-
-def block_colours(block: NDArray[np.int64], bench: Bench) -> _Colours:
-    """RGBA (n, 4) of each ball: hue by row, lightness by column, grey without a block."""
-    rows, columns = block_shape(bench)
-    row, column = np.divmod(block, columns)
-    palette = _row_palette(rows)
-    colours = palette[np.clip(row, 0, rows - 1)]
-    # Lighter every other column, so that the edges of the blocks can be followed.
-    pale = (column % 2 == 1)[:, None]
-    colours[:, :3] = np.where(pale, 0.62 * colours[:, :3] + 0.38, colours[:, :3])
-    colours[block < 0] = _GREY
-    return np.asarray(colours)
-
-
-def _row_palette(rows: int) -> _Colours:
-    share = np.linspace(0.08, 0.92, rows) if rows > 1 else np.array([0.3])
-    return np.asarray(colormaps["viridis"](share), dtype=np.float64)
-
-
-def _draw_balls(
-    axes: Any, horizontal: _Colours, vertical: _Colours, radius: _Colours, colours: _Colours
-) -> None:
-    """Balls as circles in data units, in the order given (the last on top)."""
-    size = 2.0 * radius
-    circles = EllipseCollection(
-        size,
-        size,
-        np.zeros_like(size),
-        units="xy",
-        offsets=np.column_stack([horizontal, vertical]),
-        offset_transform=axes.transData,
-        facecolors=colours,
-        edgecolors=_edges(colours),
-        linewidths=0.15,
-    )
-    circles.set_rasterized(True)
-    axes.add_collection(circles)
-
-
-def _edges(colours: _Colours) -> _Colours:
-    edges = colours.copy()
-    edges[:, :3] *= 0.55
-    return edges
-
-
-def _legend(figure: Any, axes: Any, bench: Bench) -> None:
-    """Name some rows by their colours, and the lines of `axes` that carry a label."""
-    rows, _ = block_shape(bench)
-    shown = range(rows) if rows <= 4 else sorted({0, rows // 3, 2 * rows // 3, rows - 1})
-    palette = _row_palette(rows)
-    names = {0: "row 1 (face)", rows - 1: f"row {rows} (rear)"}
-    handles: list[Any] = [
-        Patch(color=palette[i], label=names.get(i, f"row {i + 1}")) for i in shown
-    ]
-    handles += axes.get_legend_handles_labels()[0]
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), handlelength=1.4)
-
-
-def _outside(balls: Particles, **limits: tuple[float, float]) -> str:
-    """Say how many balls a picture leaves out; empty if none."""
-    seen = np.ones(balls.radius.size, dtype=bool)
-    for name, (low, high) in limits.items():
-        along = balls.position[:, "xyz".index(name)]
-        seen &= (along >= low) & (along <= high)
-    left_out = int((~seen).sum())
-    return f" ({left_out:,} of {seen.size:,} balls lie outside the picture)" if left_out else ""
-
-
-def _extent(before: Particles, after: Particles, axis: int) -> tuple[float, float]:
-    """Range that holds nearly all balls of both states."""
-    low, high = np.inf, -np.inf
-    for balls in (before, after):
-        along = balls.position[:, axis]
-        radius = float(balls.radius.max())
-        low = min(low, float(np.quantile(along, 1.0 - _SHOWN)) - radius)
-        high = max(high, float(np.quantile(along, _SHOWN)) + radius)
-    pad = _MARGIN * (high - low)
-    return low - pad, high + pad
+_Limits = tuple[float, float, float, float]
 
 
 @in_style
@@ -116,10 +38,10 @@ def draw_section(
     before: Particles,
     after: Particles,
     bench: Bench,
+    walls: Walls,
     *,
     y: float,
     mean_profile: Profile,
-    slope: tuple[float, float] | None = None,
 ) -> Path:
     """Draw the bench and the muckpile in section, one above the other.
 
@@ -129,55 +51,91 @@ def draw_section(
         Picture to write (PNG or SVG).
     before, after : Particles
     bench : Bench
+    walls : Walls
+        Ground.
     y : float [m]
-        Where the section is cut; balls within one mean diameter of it are drawn in full.
+        Where the section is cut; what lies up to one spacing behind the cut is seen.
     mean_profile : Profile
         Surface of the muckpile averaged along the bench, drawn as a line.
-    slope : (toe x [m], angle [rad]), optional
     """
-    low, high = _extent(before, after, 0)
-    top = 1.18 * max(bench.height, float(np.quantile(after.position[:, 2], _SHOWN)))
-    height = 2.0 * (_WIDTH - 0.8) * (top * 1.06) / (high - low) + 1.6
-    figure, axes = new_figure(2, 1, width=_WIDTH, height=min(max(height, 3.4), 9.0), sharex=True)
-    for panel, balls, title in (
-        (axes[0], before, f"Before, section at y = {y:.1f} m"),
-        (axes[1], after, "After"),
-    ):
-        near = _slab(balls, y)
-        order = near[np.argsort(-balls.position[near, 1])]
-        _draw_balls(
-            panel,
-            balls.position[order, 0],
-            balls.position[order, 2],
-            balls.radius[order],
-            block_colours(balls.block[order], bench),
-        )
-        _draw_ground(panel, low, high, top, slope)
-        panel.set(title=title, ylabel="z [m]", xlim=(low, high), ylim=(-0.05 * top, top))
-        panel.set_aspect("equal")
+    limits = _section_limits(before, after, bench)
+    figure, axes = _section_panels(2, limits)
+    _draw_cut(axes[0], before, bench, walls, y, limits)
+    _draw_cut(axes[1], after, bench, walls, y, limits)
     _draw_outline(axes[1], bench)
     axes[1].plot(mean_profile.x, mean_profile.height, color=RED, lw=1.4, label="mean surface")
-    axes[1].set_xlabel("x [m], in front of the toe of the face")
-    axes[1].set_title("After" + _outside(after, x=(low, high)))
-    _legend(figure, axes[1], bench)
+    axes[0].set_title(f"Before, section at y = {y:.1f} m")
+    axes[1].set_title("After" + left_out_words(after, x=limits[:2]))
+    block_legend(figure, axes[1], bench)
     return save_figure(figure, path, dpi=180)
 
 
-def _slab(balls: Particles, y: float) -> NDArray[np.int64]:
-    return np.flatnonzero(np.abs(balls.position[:, 1] - y) < 2.0 * balls.radius.mean())
+@in_style
+def draw_sections(
+    path: Path,
+    before: Particles,
+    after: Particles,
+    bench: Bench,
+    walls: Walls,
+    sections: Sequence[tuple[float, Profile]],
+) -> Path:
+    """Draw the muckpile in section at several places along the bench.
+
+    Parameters
+    ----------
+    path : Path
+        Picture to write (PNG or SVG).
+    before, after : Particles
+    bench : Bench
+    walls : Walls
+        Ground.
+    sections : sequence of (y [m], Profile)
+        Place of each cut and the surface there.
+    """
+    limits = _section_limits(before, after, bench)
+    figure, axes = _section_panels(len(sections), limits)
+    for panel, (y, profile) in zip(np.atleast_1d(axes), sections, strict=True):
+        _draw_cut(panel, after, bench, walls, y, limits)
+        _draw_outline(panel, bench)
+        panel.plot(profile.x, profile.height, color=RED, lw=1.2, label="surface")
+        panel.set_title(f"y = {y:.1f} m")
+    block_legend(figure, np.atleast_1d(axes)[0], bench)
+    return save_figure(figure, path, dpi=180)
 
 
-def _draw_ground(
-    axes: Any, low: float, high: float, top: float, slope: tuple[float, float] | None
+def _section_limits(before: Particles, after: Particles, bench: Bench) -> _Limits:
+    low, high = shown_range(before, after, 0)
+    top = 1.1 * max(bench.height, shown_range(before, after, 2)[1])
+    return low, high, -0.05 * top, top
+
+
+def _section_panels(count: int, limits: _Limits) -> tuple[Any, Any]:
+    low, high, bottom, top = limits
+    each = (WIDTH - 0.8) * (top - bottom) / (high - low) + 0.35
+    figure, axes = new_figure(
+        count, 1, width=WIDTH, height=min(max(count * each + 0.9, 3.0), 11.0), sharex=True
+    )
+    for panel in np.atleast_1d(axes):
+        panel.set_ylabel("z [m]")
+    np.atleast_1d(axes)[-1].set_xlabel("x [m], in front of the toe of the face")
+    return figure, axes
+
+
+def _draw_cut(
+    axes: Any,
+    balls: Particles,
+    bench: Bench,
+    walls: Walls,
+    y: float,
+    limits: _Limits,
 ) -> None:
-    axes.axhspan(-0.05 * top, 0.0, color="#DDD6CC", lw=0.0)
-    axes.axhline(0.0, color=_INK, lw=0.8)
-    if slope is not None:
-        toe, angle = slope
-        end = max(high, toe)
-        rise = (end - toe) * np.tan(angle)
-        axes.fill([toe, end, end], [0.0, 0.0, rise], color="#DDD6CC", lw=0.0)
-        axes.plot([toe, end], [0.0, rise], color=_INK, lw=0.8)
+    """Draw what lies behind the cut at `y`, with the ground."""
+    behind = balls.position[:, 1] - y
+    seen = (behind >= -balls.radius.mean()) & (behind < bench.spacing)
+    draw_ground_line(axes, walls, y, limits[0], limits[1], limits[2])
+    canvas = Canvas(SECTION, limits)
+    canvas.add(balls.position[seen], balls.radius[seen], block_colours(balls.block[seen], bench))
+    canvas.show(axes)
 
 
 def _draw_outline(axes: Any, bench: Bench) -> None:
@@ -185,7 +143,7 @@ def _draw_outline(axes: Any, bench: Bench) -> None:
     axes.plot(
         [-bench.width, -bench.width, crest, 0.0],
         [0.0, bench.height, bench.height, 0.0],
-        color=_INK,
+        color=INK,
         lw=1.0,
         ls=(0, (4, 3)),
         label="bench before",
@@ -203,52 +161,33 @@ def draw_plan(path: Path, before: Particles, after: Particles, bench: Bench) -> 
     before, after : Particles
     bench : Bench
     """
-    x_low, x_high = _extent(before, after, 0)
-    y_low, y_high = _extent(before, after, 1)
-    across = (y_high - y_low) / (x_high - x_low)
+    x, y = shown_range(before, after, 0), shown_range(before, after, 1)
+    across = (y[1] - y[0]) / (x[1] - x[0])
     beside = across < 1.2  # a narrow bench: two panels one above the other would be too flat
     rows, columns = (2, 1) if not beside else (1, 2)
     height = _plan_height(across, beside=beside)
-    figure, axes = new_figure(rows, columns, width=_WIDTH, height=height, sharex=True, sharey=True)
-    for panel, balls, title in ((axes[0], before, "Before, from above"), (axes[1], after, "After")):
-        order = _seen_from_above(balls)
-        horizontal, vertical = (0, 1) if beside else (1, 0)
-        _draw_balls(
-            panel,
-            balls.position[order, horizontal],
-            balls.position[order, vertical],
-            balls.radius[order],
-            block_colours(balls.block[order], bench),
-        )
+    figure, axes = new_figure(rows, columns, width=WIDTH, height=height, sharex=True, sharey=True)
+    for panel, balls in zip(axes, (before, after), strict=True):
+        colours = block_colours(balls.block, bench)
+        if beside:
+            canvas, shown = Canvas(PLAN_X, (*x, *y)), (*x, *y)
+        else:
+            canvas, shown = Canvas(PLAN_Y, (*y, -x[1], -x[0])), (*y, x[1], x[0])
+        canvas.add(balls.position, balls.radius, colours)
+        canvas.show(panel, shown)
         _draw_face(panel, bench, beside=beside)
-        panel.set_title(title)
-        panel.set_aspect("equal")
-        limits = {"x": (x_low, x_high), "y": (y_low, y_high)}
-        across_name, up_name = ("x", "y") if beside else ("y", "x")
-        panel.set(xlim=limits[across_name], ylim=limits[up_name])
     thrown, along = "x [m], direction of throw", "y [m], along the bench"
     for panel in axes:
         panel.set(xlabel=thrown if beside else along, ylabel=along if beside else thrown)
         panel.label_outer()
-    axes[1].set_title("After" + _outside(after, x=(x_low, x_high), y=(y_low, y_high)))
-    _legend(figure, axes[0], bench)
+    axes[0].set_title("Before, from above")
+    axes[1].set_title("After" + left_out_words(after, x=x, y=y))
+    block_legend(figure, axes[0], bench)
     return save_figure(figure, path, dpi=180)
 
 
-def _seen_from_above(balls: Particles) -> NDArray[np.int64]:
-    """Balls near the surface from the lowest to the highest; the buried ones are not drawn."""
-    size = 2.0 * float(balls.radius.mean())
-    cell = np.floor((balls.position[:, :2] - balls.position[:, :2].min(axis=0)) / size)
-    column = (cell[:, 0] * (cell[:, 1].max() + 1.0) + cell[:, 1]).astype(np.int64)
-    height = balls.position[:, 2]
-    highest = np.full(int(column.max()) + 1, -np.inf)
-    np.maximum.at(highest, column, height)
-    near = np.flatnonzero(height > highest[column] - 3.0 * size)
-    return near[np.argsort(height[near])]
-
-
 def _plan_height(across: float, *, beside: bool) -> float:
-    inner = _WIDTH - 0.8
+    inner = WIDTH - 0.8
     height = 0.5 * inner * across if beside else 2.0 * inner / across
     return min(max(height + 1.1, 3.0), 11.0)
 
@@ -260,8 +199,8 @@ def _draw_face(axes: Any, bench: Bench, *, beside: bool) -> None:
 
 
 @in_style
-def draw_energy(path: Path, history: CastHistory) -> Path:
-    """Draw kinetic energies and the movement of the centre of mass over time.
+def draw_energy(path: Path, history: CastHistory, ledger: EnergyLedger) -> Path:
+    """Draw kinetic energies and the movement of the centre of mass over time, and the budget.
 
     Parameters
     ----------
@@ -269,8 +208,9 @@ def draw_energy(path: Path, history: CastHistory) -> Path:
         Picture to write (PNG or SVG).
     history : CastHistory
         Arrays of shape (k,), centre of mass (k, 3).
+    ledger : EnergyLedger
     """
-    figure, (left, right) = new_figure(1, 2, width=_WIDTH, height=3.2)
+    figure, (left, middle, right) = new_figure(1, 3, width=12.0, height=3.2)
     for values, name, colour in (
         (history.translational_energy, "translation", BLUE),
         (history.rotational_energy, "rotation", ORANGE),
@@ -280,9 +220,31 @@ def draw_energy(path: Path, history: CastHistory) -> Path:
     left.set(title="Kinetic energy", xlabel="time [s]", ylabel="[MJ]")
     left.legend()
     moved = history.centre_of_mass - history.centre_of_mass[0]
-    right.plot(history.time, moved[:, 0], color=BLUE, label="throw, x")
-    right.plot(history.time, moved[:, 2], color=GREEN, label="drop, z")
-    right.axhline(0.0, color=GREY, lw=0.8)
-    right.set(title="Movement of the centre of mass", xlabel="time [s]", ylabel="[m]")
-    right.legend()
+    middle.plot(history.time, moved[:, 0], color=BLUE, label="throw, x")
+    middle.plot(history.time, moved[:, 2], color=GREEN, label="drop, z")
+    middle.axhline(0.0, color=GREY, lw=0.8)
+    middle.set(title="Movement of the centre of mass", xlabel="time [s]", ylabel="[m]")
+    middle.legend()
+    _draw_budget(right, ledger)
     return save_figure(figure, path)
+
+
+def _draw_budget(axes: Any, ledger: EnergyLedger) -> None:
+    """Bars of what was put in and where it went."""
+    initial_height = ledger.initial - ledger.potential
+    entries = [
+        ("fired", ledger.fired, BLUE),
+        ("fall of the pile", initial_height, BLUE),
+        ("sliding", ledger.slip, RED),
+        ("rolling", ledger.rolling_slip, RED),
+        ("impact (dashpots)", ledger.dashpot, RED),
+        ("still moving or elastic", ledger.kinetic + ledger.spring, GREY),
+    ]
+    known = [(name, value * 1e-6, colour) for name, value, colour in entries if np.isfinite(value)]
+    names, values, colours = zip(*known, strict=True)
+    bars = axes.barh(names, values, color=colours)
+    axes.bar_label(bars, fmt="%.3g", padding=3, fontsize=8)
+    axes.margins(x=0.2)
+    axes.invert_yaxis()
+    axes.grid(visible=False, axis="y")
+    axes.set(title="Energy put in (blue) and spent (red)", xlabel="[MJ]")

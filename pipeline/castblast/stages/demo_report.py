@@ -135,7 +135,11 @@ def _muckpile(folder: Path) -> Section:
     )
     captions = {
         "section": "Cross-section, balls coloured by block",
+        "sections": "Cross-sections along the bench, after",
         "plan": "Plan view, before and after",
+        "view": "Bench and muckpile from above and aside",
+        "movement": "Movement vectors of the blocks; ellipses are one standard deviation",
+        "profiles": "Surface of the muckpile and its scatter along the bench",
         "energy": "Energy over time",
     }
     pictures = [

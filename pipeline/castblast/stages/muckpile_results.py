@@ -13,24 +13,33 @@ import numpy as np
 
 from castblast.errors import Status
 from castblast.files import write_csv, write_text, write_with
-from castblast.muckpile.bench import Bench, block_shape
-from castblast.muckpile.metrics import PileMetrics
+from castblast.muckpile.metrics import UNITS, PileMetrics
 from castblast.muckpile.particles import Particles
-from castblast.muckpile.profile import (
-    HeightField,
-    Profile,
-    mean_profile,
-    section,
-    surface_height,
-)
-from castblast.muckpile.solver import CastCase, CastHistory, CastResult
-from castblast.muckpile.walls import Walls, ground_height
+from castblast.muckpile.profile import mean_profile
+from castblast.muckpile.solver import CastCase, CastResult
 from castblast.specs.bench import BenchSpec
+from castblast.stages.muckpile_ore import OreRun, describe_ore, ore_rows
+from castblast.stages.muckpile_tables import (
+    block_columns,
+    history_columns,
+    middle_section,
+    pile_sections,
+    pile_surface,
+    profile_columns,
+)
 
-#: Shares of the length of the bench at which the profile is written, besides the mean.
-SECTIONS = (0.25, 0.5, 0.75)
-# Balls of a file may lie beside the bench: then the surface is taken over all of them.
-_INSIDE_SHARE = 0.9
+#: Unit of every number in the document; "1": none.
+DOCUMENT_UNITS = {
+    "mean_radius": "m",
+    "solid_fraction": "1",
+    "initial_velocity": "m s-1",
+    "simulated_time": "s",
+    **UNITS,
+    "ledger": "J, residual 1",
+    "counters": "1, steps in s",
+    "ore": "m, m2, kg; grades as given",
+    "seconds": "s",
+}
 
 
 @dataclass(frozen=True)
@@ -70,6 +79,7 @@ def describe_run(
     start: Start,
     result: CastResult,
     metrics: PileMetrics,
+    ore: OreRun | None = None,
 ) -> MuckpileOutcome:
     """Put the results of a run into a document and rows for people; NaN where nothing is known."""
     counters = result.counters._asdict()
@@ -87,11 +97,13 @@ def describe_run(
         "surrogate": dict(prediction) if prediction else None,
         "simulated_time": result.time,
         **metrics._asdict(),
+        "ore": describe_ore(ore) if ore else None,
+        "units": DOCUMENT_UNITS,
         "ledger": result.ledger._asdict(),
         "counters": counters,
         "seconds": seconds,
     }
-    plain = {key: _plain(value) for key, value in document.items()}
+    plain: dict[str, Any] = _plain(document)
     title = f"{spec.name}: {plain['balls']:,} balls, {speed:.3g} m/s, {result.time:.1f} s simulated"
     if Status(result.status) is Status.NOT_CONVERGED:
         title += " (longest time reached before the pile came to rest)"
@@ -108,18 +120,21 @@ def metric_rows(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         ("run-out of 95 % of the mass", document["runout_95"], "m"),
         ("run-out of 99 % of the mass", document["runout_99"], "m"),
         ("maximum height", document["maximum_height"], "m"),
+        ("dig height", document["dig_height"], "m"),
         ("swell: pile over bench volume", document["swell"], "1"),
         ("pile volume over volume of the balls", document["rock_swell"], "1"),
         ("mean slope of the pile", _scaled(document["repose_angle"], 180.0 / math.pi), "deg"),
         ("throw in free flight", document["ballistic_throw"], "m"),
+        ("cast fraction in free flight", _scaled(document["ballistic_cast_fraction"], 100.0), "%"),
         ("open energy balance", _scaled(document["ledger"]["residual"], 100.0), "%"),
         ("time on the clock", document.get("seconds"), "s"),
     )
-    return [
+    rows = [
         (name, "-" if value is None else f"{value:.3g}", unit)
         for name, value, unit in entries
         if name != "time on the clock" or value is not None
     ]
+    return rows + (ore_rows(_finite(document["ore"])) if document.get("ore") else [])
 
 
 def _scaled(value: float | None, factor: float) -> float | None:
@@ -132,16 +147,15 @@ def write_results(
     case: CastCase,
     result: CastResult,
     document: Mapping[str, Any],
+    ore: OreRun | None = None,
 ) -> list[Path]:
-    """Write final state, profile, history, metrics and pictures into `folder`.
+    """Write final state, tables, metrics and pictures into `folder`.
 
     The files depend on bench file and code only: the time on the clock is left out of them.
     """
-    from castblast.report.muckpile_figures import draw_energy, draw_plan, draw_section
-
     bench, before, after = spec.bench.to_bench(), case.particles, result.particles
-    surface = _surface(before, after, bench, case.walls)
-    mean = mean_profile(surface)
+    surface = pile_surface(before, after, bench, case.walls)
+    sections = pile_sections(surface, bench)
     stored: dict[str, Any] = {
         "x": after.position,
         "r": after.radius,
@@ -150,76 +164,69 @@ def write_results(
         "block": after.block,
         "x_before": before.position,
     }
-    slope = (spec.slope.distance, spec.slope.angle) if spec.slope else None
+    if ore:
+        stored["polygon"] = ore.moved.polygon
     timeless = {k: v for k, v in document.items() if k not in ("seconds", "packing_reused")}
-    return [
+    files = [
         write_with(folder / "final_state.npz", lambda name: np.savez_compressed(name, **stored)),
-        write_csv(folder / "profile.csv", _profile_columns(surface, mean)),
-        write_csv(folder / "history.csv", _history_columns(result.history)),
+        write_csv(folder / "profile.csv", profile_columns(surface, sections)),
+        write_csv(folder / "history.csv", history_columns(result.history)),
+        write_csv(folder / "blocks.csv", block_columns(case, after, bench)),
         write_text(folder / "metrics.json", json.dumps(_finite(timeless), indent=2) + "\n"),
-        draw_section(
-            folder / "section.png",
-            before,
-            after,
-            bench,
-            y=_section_place(before, bench),
-            mean_profile=mean,
-            slope=slope,
-        ),
-        draw_plan(folder / "plan.png", before, after, bench),
-        draw_energy(folder / "energy.png", result.history),
     ]
+    return files + _draw(folder, spec, case, result, ore)
 
 
-def _inside(balls: Particles, bench: Bench) -> bool:
-    along = balls.position[:, 1]
-    return bool(((along >= 0.0) & (along <= bench.length)).mean() >= _INSIDE_SHARE)
+def _draw(
+    folder: Path, spec: BenchSpec, case: CastCase, result: CastResult, ore: OreRun | None
+) -> list[Path]:
+    """Draw all pictures of a run."""
+    from castblast.report.movement_figures import draw_movement, draw_ore, draw_profiles
+    from castblast.report.muckpile_figures import (
+        draw_energy,
+        draw_plan,
+        draw_section,
+        draw_sections,
+    )
+    from castblast.report.muckpile_view import draw_view
 
-
-def _surface(before: Particles, after: Particles, bench: Bench, walls: Walls) -> HeightField:
-    """Top of the pile, or of the ground where there is none."""
-    cell = float(2.0 * after.radius.mean())
-    span = (0.0, bench.length) if _inside(before, bench) else None
-    surface = surface_height(after.position, after.radius, cell=cell, y_range=span)
-    ground = ground_height(walls, *np.meshgrid(surface.x, surface.y))
-    return surface._replace(height=np.maximum(surface.height, ground))
-
-
-def _section_place(before: Particles, bench: Bench) -> float:
-    """Middle of the column of blocks nearest to the middle of the bench."""
-    if not _inside(before, bench):
-        return float(np.median(before.position[:, 1]))
-    _, columns = block_shape(bench)
-    return min((columns // 2 + 0.5) * bench.spacing, bench.length)
-
-
-def _profile_columns(surface: HeightField, mean: Profile) -> dict[str, Any]:
-    columns: dict[str, Any] = {"x [m]": mean.x, "mean_height [m]": mean.height}
-    half = 0.5 * (surface.y[-1] - surface.y[0]) / max(len(surface.y) - 1, 1)
-    low, high = surface.y[0] - half, surface.y[-1] + half
-    for share in SECTIONS:
-        y = low + share * (high - low)
-        columns[f"height_at_y_{y:.1f}_m [m]"] = section(surface, y).height
-    return columns
-
-
-def _history_columns(history: CastHistory) -> dict[str, Any]:
-    centre = history.centre_of_mass
-    return {
-        "time [s]": history.time,
-        "translational_energy [J]": history.translational_energy,
-        "rotational_energy [J]": history.rotational_energy,
-        "centre_x [m]": centre[:, 0],
-        "centre_y [m]": centre[:, 1],
-        "centre_z [m]": centre[:, 2],
-        "contacts": history.contacts,
-    }
+    bench, walls = spec.bench.to_bench(), case.walls
+    before, after = case.particles, result.particles
+    surface = pile_surface(before, after, bench, walls)
+    sections = pile_sections(surface, bench)
+    mean, y = mean_profile(surface), middle_section(before, bench)
+    spread = surface.height.std(axis=0)
+    files = [
+        draw_section(folder / "section.png", before, after, bench, walls, y=y, mean_profile=mean),
+        draw_sections(folder / "sections.png", before, after, bench, walls, sections),
+        draw_plan(folder / "plan.png", before, after, bench),
+        draw_view(folder / "view.png", before, after, bench, walls),
+        draw_profiles(
+            folder / "profiles.png",
+            {f"y = {place:.1f} m": profile for place, profile in sections},
+            bench,
+            walls,
+            band=(mean, spread),
+            band_words="one standard deviation along the bench",
+        ),
+        draw_energy(folder / "energy.png", result.history, result.ledger),
+    ]
+    if (before.block >= 0).any():
+        files.append(draw_movement(folder / "movement.png", before, after, bench, walls))
+    if ore:
+        picture = folder / "ore.png"
+        files.append(
+            draw_ore(picture, before, after, bench, ore.polygons, ore.moved, ore.plan.block)
+        )
+    return files
 
 
 def _plain(value: Any) -> Any:
-    """Arrays and NumPy scalars as Python lists and numbers."""
+    """Arrays and NumPy scalars as Python lists and numbers, at any depth."""
     if isinstance(value, Mapping):
         return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
