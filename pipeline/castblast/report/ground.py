@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from castblast.muckpile.profile import Profile
 from castblast.muckpile.walls import Walls, ground_height
 
 Floats = NDArray[np.float64]
@@ -21,9 +22,13 @@ def draw_ground_line(
 ) -> None:
     """Fill the ground between x = low and high [m] in the section at `y`, down to `bottom`."""
     x = np.linspace(low, high, _STEPS)
-    height = ground_height(walls, x, np.full_like(x, y))
-    axes.fill_between(x, bottom, height, color=EARTH, lw=0.0, zorder=1.0)
-    axes.plot(x, height, color=INK, lw=0.8, zorder=1.1)
+    draw_ground(axes, Profile(x, ground_height(walls, x, np.full_like(x, y))), bottom)
+
+
+def draw_ground(axes: Any, ground: Profile, bottom: float) -> None:
+    """Fill what is below a ground line, down to `bottom` [m]."""
+    axes.fill_between(ground.x, bottom, ground.height, color=EARTH, lw=0.0, zorder=1.0)
+    axes.plot(ground.x, ground.height, color=INK, lw=0.8, zorder=1.1)
 
 
 def ground_points(

@@ -16,7 +16,7 @@ from castblast.muckpile.movement import block_levels, group_movement
 from castblast.muckpile.particles import Particles
 from castblast.report.ball_picture import PLAN_X, Canvas
 from castblast.report.blocks import WIDTH, shown_range
-from castblast.report.ground import INK, draw_ground_line
+from castblast.report.ground import INK, draw_ground, draw_ground_line
 from castblast.report.style import CYCLE, GREY, RED, in_style, new_figure, save_figure
 
 if TYPE_CHECKING:
@@ -56,17 +56,18 @@ def draw_movement(
     rows, columns = block_shape(bench)
     x, y = shown_range(before, after, 0), shown_range(before, after, 1)
     z_top = 1.15 * bench.height
-    ratio = (y[1] - y[0]) / (x[1] - x[0])
-    height = (WIDTH - 1.2) * (ratio + z_top / (x[1] - x[0])) + 1.4
+    rises = [(y[1] - y[0]) / (x[1] - x[0]), 1.05 * z_top / (x[1] - x[0])]
+    inner = min(WIDTH - 1.0, 10.0 / sum(rises))  # long benches: narrower, not higher
     figure, (plan, side) = new_figure(
-        2, 1, width=WIDTH, height=min(max(height, 4.0), 14.0), sharex=True,
-        height_ratios=[y[1] - y[0], 1.05 * z_top],
-    )  # fmt: skip
+        2, 1, width=inner + 1.0, height=inner * sum(rises) + 2.2, sharex=True, height_ratios=rises
+    )
     blocks = group_movement(before, after, before.block, rows * columns)
     arrows = _draw_vectors(plan, blocks.start, blocks.displacement, blocks.spread, (0, 1))
     _draw_block_lines(plan, bench)
     plan.set(title="Movement of the blocks, from above", ylabel="y [m], along the bench", ylim=y)
-    figure.colorbar(arrows, ax=plan, label="throw, horizontal [m]", pad=0.01)
+    figure.colorbar(
+        arrows, ax=side, label="throw, horizontal [m]", location="bottom", aspect=40, shrink=0.8
+    )
 
     row = np.where(before.block >= 0, before.block // columns, -1)
     group = block_levels(before._replace(block=row), bench.height, LEVELS, rows)
@@ -135,7 +136,7 @@ def draw_profiles(
     path: Path,
     profiles: Mapping[str, Profile],
     bench: Bench,
-    walls: Walls,
+    ground: Profile,
     *,
     band: tuple[Profile, Floats] | None = None,
     band_words: str = "",
@@ -149,8 +150,7 @@ def draw_profiles(
         Picture to write (PNG or SVG).
     profiles : mapping of name to Profile
     bench : Bench
-    walls : Walls
-        Ground, at the middle of the bench.
+    ground : Profile
     band : (Profile, half width (nx,) [m]), optional
         Drawn as a line with a band around it.
     band_words : str
@@ -164,7 +164,7 @@ def draw_profiles(
     top = 1.1 * max(bench.height, *(float(p.height[p.x <= high].max()) for p in every))
     height = (WIDTH - 0.8) * top / (high - low) + 1.2
     figure, axes = new_figure(1, 1, width=WIDTH, height=max(height, 2.8))
-    draw_ground_line(axes, walls, 0.5 * bench.length, low, high, -0.05 * top)
+    draw_ground(axes, ground, -0.05 * top)
     crest = crest_position(bench)
     axes.plot([-bench.width, -bench.width, crest, 0.0], [0.0, bench.height, bench.height, 0.0],
               color=INK, lw=1.0, ls=(0, (4, 3)), label="bench before")  # fmt: skip

@@ -243,8 +243,9 @@ def _draw_budget(axes: Any, ledger: EnergyLedger) -> None:
     known = [(name, value * 1e-6, colour) for name, value, colour in entries if np.isfinite(value)]
     names, values, colours = zip(*known, strict=True)
     bars = axes.barh(names, values, color=colours)
-    axes.bar_label(bars, fmt="%.3g", padding=3, fontsize=8)
-    axes.margins(x=0.2)
+    words = [f"{v:,.0f}" if abs(v) >= 100.0 else f"{v:.3g}" for v in values]
+    axes.bar_label(bars, words, padding=3, fontsize=8)
+    axes.margins(x=0.25)
     axes.invert_yaxis()
     axes.grid(visible=False, axis="y")
     axes.set(title="Energy put in (blue) and spent (red)", xlabel="[MJ]")

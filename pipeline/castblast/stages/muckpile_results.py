@@ -21,6 +21,7 @@ from castblast.specs.bench import BenchSpec
 from castblast.stages.muckpile_ore import OreRun, describe_ore, ore_rows
 from castblast.stages.muckpile_tables import (
     block_columns,
+    ground_profile,
     history_columns,
     middle_section,
     pile_sections,
@@ -30,6 +31,7 @@ from castblast.stages.muckpile_tables import (
 
 #: Unit of every number in the document; "1": none.
 DOCUMENT_UNITS = {
+    "geometry": "m, face_angle rad",
     "mean_radius": "m",
     "solid_fraction": "1",
     "initial_velocity": "m s-1",
@@ -87,6 +89,8 @@ def describe_run(
     document = {
         "bench": spec.name,
         "bench_sha256": spec.sha256(),
+        "seed": spec.seed,
+        "geometry": spec.bench.to_bench()._asdict(),
         "status": Status(result.status).name.lower(),
         "balls": len(start.balls.radius),
         "mean_radius": float(start.balls.radius.mean()),
@@ -134,7 +138,7 @@ def metric_rows(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         for name, value, unit in entries
         if name != "time on the clock" or value is not None
     ]
-    return rows + (ore_rows(_finite(document["ore"])) if document.get("ore") else [])
+    return rows + (ore_rows(finite(document["ore"])) if document.get("ore") else [])
 
 
 def _scaled(value: float | None, factor: float) -> float | None:
@@ -156,6 +160,7 @@ def write_results(
     bench, before, after = spec.bench.to_bench(), case.particles, result.particles
     surface = pile_surface(before, after, bench, case.walls)
     sections = pile_sections(surface, bench)
+    ground = ground_profile(surface, bench, case.walls)
     stored: dict[str, Any] = {
         "x": after.position,
         "r": after.radius,
@@ -169,10 +174,10 @@ def write_results(
     timeless = {k: v for k, v in document.items() if k not in ("seconds", "packing_reused")}
     files = [
         write_with(folder / "final_state.npz", lambda name: np.savez_compressed(name, **stored)),
-        write_csv(folder / "profile.csv", profile_columns(surface, sections)),
+        write_csv(folder / "profile.csv", profile_columns(surface, sections, ground)),
         write_csv(folder / "history.csv", history_columns(result.history)),
         write_csv(folder / "blocks.csv", block_columns(case, after, bench)),
-        write_text(folder / "metrics.json", json.dumps(_finite(timeless), indent=2) + "\n"),
+        write_text(folder / "metrics.json", json.dumps(finite(timeless), indent=2) + "\n"),
     ]
     return files + _draw(folder, spec, case, result, ore)
 
@@ -205,7 +210,7 @@ def _draw(
             folder / "profiles.png",
             {f"y = {place:.1f} m": profile for place, profile in sections},
             bench,
-            walls,
+            ground_profile(surface, bench, walls),
             band=(mean, spread),
             band_words="one standard deviation along the bench",
         ),
@@ -230,10 +235,10 @@ def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any) -> Any:
     """NaN and infinity as null, which JSON can hold."""
     if isinstance(value, Mapping):
-        return {key: _finite(item) for key, item in value.items()}
+        return {key: finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
+        return [finite(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -19,6 +19,7 @@ from castblast.muckpile.profile import (
 )
 from castblast.muckpile.walls import Walls, ground_height
 
+X_COLUMN, MEAN_COLUMN, GROUND_COLUMN = "x [m]", "mean_height [m]", "ground [m]"
 #: Shares of the length of the bench at which sections are cut, besides the mean.
 SECTIONS = (0.25, 0.5, 0.75)
 # Balls of a file may lie beside the bench: then the surface is taken over all of them.
@@ -56,12 +57,18 @@ def middle_section(before: Particles, bench: Bench) -> float:
     return (columns // 2) * bench.spacing
 
 
+def ground_profile(surface: HeightField, bench: Bench, walls: Walls) -> Profile:
+    """Ground in the middle of the bench, at the places of the surface."""
+    y = np.full_like(surface.x, 0.5 * bench.length)
+    return Profile(surface.x, ground_height(walls, surface.x, y))
+
+
 def profile_columns(
-    surface: HeightField, sections: list[tuple[float, Profile]]
+    surface: HeightField, sections: list[tuple[float, Profile]], ground: Profile
 ) -> dict[str, FloatArray]:
-    """Columns of the mean profile and of the sections, in m."""
+    """Columns of the mean profile, of the ground and of the sections, in m."""
     mean = mean_profile(surface)
-    columns = {"x [m]": mean.x, "mean_height [m]": mean.height}
+    columns = {X_COLUMN: mean.x, MEAN_COLUMN: mean.height, GROUND_COLUMN: ground.height}
     for y, profile in sections:
         columns[f"height_at_y_{y:.1f}_m [m]"] = profile.height
     return columns
