@@ -12,7 +12,7 @@ import yaml
 
 from castblast.errors import SpecError
 from castblast.resources import resource
-from castblast.specs.balls import read_balls
+from castblast.specs.ball_files import read_balls
 from castblast.specs.bench import find_bench, load_bench
 
 BENCH: dict[str, Any] = {
@@ -96,7 +96,7 @@ def test_design_for_the_surrogate_takes_the_geometry_of_the_bench(tmp_path: Path
         ({"surrogate": {"explosive": "anfo"}}, "either 'velocity' or 'surrogate' is needed"),
         ({"surrogate": {"usc": "3 MPa"}}, "usc: unknown variable, did you mean 'ucs'?"),
         ({"surrogate": {"burden": "3 m"}}, "burden: is taken from 'bench'"),
-        ({"firing": {"pattern": "echeln"}}, "'echelon', 'row', 'v' or 'none'"),
+        ({"firing": {"pattern": "echeln"}}, "'echelon', 'row', 'v', 'holes' or 'none'"),
         ({"firing": {"pattern": "none"}}, "firing.pattern 'none' takes no velocity"),
         ({"slope": {"angle": "30 deg"}}, "slope.distance: is missing"),
     ],

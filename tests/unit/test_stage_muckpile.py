@@ -56,7 +56,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, dict[str,
 
 def test_every_file_is_written(run: tuple[Path, Path, dict[str, Any]]) -> None:
     _, out, document = run
-    assert sorted(p.name for p in out.iterdir() if p.name != "packing.npz") == list(FILES)
+    assert sorted(p.name for p in out.iterdir() if p.name != "packings") == list(FILES)
     stored = json.loads((out / "metrics.json").read_text())
     assert stored["throw"] == document["throw"]
     for name in ("profile.csv", "history.csv", "blocks.csv"):

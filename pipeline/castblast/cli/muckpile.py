@@ -1,6 +1,7 @@
 """`castblast muckpile`: throw a bench with the discrete-element model."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -31,13 +32,26 @@ def muckpile(
             help='Burden velocity instead of the file\'s, "12.7 m/s".', show_default=False
         ),
     ] = None,
+    packings: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder of packings to use again and to add to; default: in the output folder.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> Mapping[str, Any]:
     """Pack, fire and settle a bench; writes final state, profile, pictures and metrics."""
     from castblast.stages.muckpile import run_muckpile
 
     with screen.progress("muckpile") as progress:
         outcome = run_muckpile(
-            bench, out, balls=balls, threads=threads, velocity=velocity, progress=progress
+            bench,
+            out,
+            balls=balls,
+            threads=threads,
+            velocity=velocity,
+            packings=packings,
+            progress=progress,
         )
     screen.table(("quantity", "value", "unit"), outcome.rows, title=outcome.title)
     for path in outcome.files:

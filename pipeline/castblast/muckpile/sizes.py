@@ -91,6 +91,20 @@ def sauter_radius(sizes: Sizes) -> float:
     return mean_of_power(sizes, 3) / mean_of_power(sizes, 2)
 
 
+def random_close_fraction(sizes: Sizes) -> float:
+    """Solid fraction of the random close packing of smooth balls (Desmond & Weeks 2014).
+
+    0.634 + 0.0658 d + 0.0857 S d^2 with standard deviation over mean d and skewness S.
+    """
+    mean, square, cube = (mean_of_power(sizes, power) for power in (1, 2, 3))
+    variance = max(square - mean * mean, 0.0)
+    third = cube - 3.0 * mean * square + 2.0 * mean**3
+    deviation = variance**0.5 / mean
+    # S d^2 is the third central moment over the standard deviation and the squared mean.
+    skewed = third / (variance**0.5 * mean * mean) if deviation > 1e-6 else 0.0
+    return float(0.634 + 0.0658 * deviation + 0.0857 * skewed)
+
+
 def volume_below(sizes: Sizes, diameter: FloatArray) -> FloatArray:
     """Share of the volume in balls below `diameter` (n,) [m]: the sieve curve."""
     share = np.diff(sizes.below) * _mean_power(sizes.radius, 3)

@@ -1,72 +1,127 @@
-"""Files of balls: centres and radii, checked before they enter a simulation."""
+"""Balls of a bench as written in its file: their number or size, and how sizes are spread."""
 
 from __future__ import annotations
 
-import zipfile
-from pathlib import Path
-from typing import Any
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, NamedTuple
 
-import numpy as np
+from pydantic import Field, model_validator
 
-from castblast.errors import SpecError, nearest_name
-from castblast.muckpile.particles import Particles, check_particles, particles_at_rest
+from castblast.muckpile.bench import Bench, bench_volume
+from castblast.muckpile.fragments import (
+    CutSizes,
+    SizeCurve,
+    coarsest,
+    cut_sizes,
+    smallest_for_count,
+)
+from castblast.muckpile.packing import check_sizes, sizes_for_count
+from castblast.muckpile.sizes import Sizes, normal_sizes, uniform_sizes
+from castblast.specs.fragments import FragmentsSpec, fragment_curve
+from castblast.specs.loading import Spec
+from castblast.specs.quantity import QuantityError, QuantityIn
 
-_KEYS = ("x", "r")
+#: With more the smallest of a normal distribution would have no size.
+_WIDEST_NORMAL = 0.4
 
 
-def read_balls(path: Path) -> Particles:
-    """Read an ``.npz`` with x (n, 3) and r (n,) in m, and optionally block (n,).
+class BallsSpec(Spec):
+    """Balls to pack (by mean radius, by number or by fragment sizes), or a file of balls.
 
-    Balls without a block have block -1.
+    Attributes
+    ----------
+    mean_radius : float [m], optional
+    count : int, optional
+        About this many balls; their mean radius follows, or the smallest of the fragments.
+    file : str, optional
+        ``.npz`` or ``.csv`` of balls, relative to the bench file.
+    distribution : {"uniform", "normal"}
+        Of the radii, by number.
+    relative_deviation : float [-]
+        Radii are uniform in mean radius times 1 -+ this; normal: standard deviation over mean, cut
+        at two of them.
+    fragments : FragmentsSpec, optional
+        Sizes by mass instead, with `count` or with the smallest fragment.
+    solid_fraction : float [-]
+    """
+
+    mean_radius: Annotated[float, QuantityIn("m", 0.005, 10.0)] | None = None
+    count: Annotated[int, Field(ge=10, le=5_000_000)] | None = None
+    file: Annotated[str, Field(min_length=1)] | None = None
+    distribution: Literal["uniform", "normal"] = "uniform"
+    relative_deviation: Annotated[float, QuantityIn("1", 0.0, 0.8)] = 0.5
+    fragments: FragmentsSpec | None = None
+    solid_fraction: Annotated[float, QuantityIn("1", 0.55, 0.63)] = 0.60
+
+    @model_validator(mode="after")
+    def _one_size(self) -> BallsSpec:
+        given = [name for name in ("mean_radius", "count", "file") if getattr(self, name)]
+        faults = []
+        if self.fragments is not None:
+            if {"mean_radius", "file"} & set(given):
+                faults.append("fragments: go with 'count' or 'fragments.smallest' only")
+            elif (self.count is None) == (self.fragments.smallest is None):
+                faults.append("exactly one of 'count' and 'fragments.smallest' is needed")
+            if {"distribution", "relative_deviation"} & self.model_fields_set:
+                faults.append("'distribution' and 'relative_deviation' mean nothing to fragments")
+        elif len(given) != 1:
+            faults.append("exactly one of 'mean_radius', 'count' and 'file' is needed")
+        if self.distribution == "normal" and self.relative_deviation > _WIDEST_NORMAL:
+            faults.append(
+                f"relative_deviation {self.relative_deviation:g}: at most {_WIDEST_NORMAL:g} for a "
+                f"normal distribution; give it explicitly"
+            )
+        if faults:
+            raise QuantityError("; ".join(faults))
+        return self
+
+    def unit_sizes(self) -> Sizes:
+        """Distribution of radii over their mean."""
+        make = normal_sizes if self.distribution == "normal" else uniform_sizes
+        return make(1.0, self.relative_deviation)
+
+
+class ChosenSizes(NamedTuple):
+    """Sizes of the balls of a bench, and the fragments that they stand for, if any."""
+
+    sizes: Sizes
+    cut: CutSizes | None = None
+    curve: SizeCurve | None = None
+
+
+def choose_sizes(spec: BallsSpec, bench: Bench, design: Mapping[str, Any]) -> ChosenSizes:
+    """Turn what is written into sizes of balls.
+
+    Parameters
+    ----------
+    spec : BallsSpec
+        Without a file.
+    bench : Bench
+    design : mapping
+        Explosive and variables [SI] that fragments may leave open.
 
     Raises
     ------
-    SpecError
-        One line per fault: no file, no npz, missing arrays, shapes, NaN, radii, overlaps.
+    ValueError
+        The balls cannot be packed; the message names every fault.
     """
-    arrays = _read_arrays(path)
-    missing = [key for key in _KEYS if key not in arrays]
-    if missing:
-        raise SpecError("\n".join(_missing_line(path, key, list(arrays)) for key in missing))
-    x, r, block = arrays["x"], arrays["r"], arrays.get("block")
-    faults = []
-    if x.ndim != 2 or x.shape[-1] != 3 or not x.size:
-        faults.append(f"{path}: x: shape {x.shape}; (n, 3) is needed")
-    if r.ndim != 1 or not r.size:
-        faults.append(f"{path}: r: shape {r.shape}; (n,) is needed")
-    if not faults and len(x) != len(r):
-        faults.append(f"{path}: x has {len(x)} balls, r has {len(r)}")
-    if not faults and block is not None and block.shape != r.shape:
-        faults.append(f"{path}: block: shape {block.shape}; {r.shape} as r is needed")
-    faults += [
-        f"{path}: {key}: type {arrays[key].dtype}; numbers are needed"
-        for key in (_KEYS if block is None else (*_KEYS, "block"))
-        if arrays[key].dtype.kind not in "fiu"
-    ]
-    if faults:
-        raise SpecError("\n".join(faults))
-    balls = particles_at_rest(x, r, None if block is None else block.astype(np.int64))
-    faults = [f"{path}: {fault}" for fault in check_particles(balls)]
-    if faults:
-        raise SpecError("\n".join(faults))
-    return balls
+    chosen = _choose(spec, bench, design)
+    if faults := check_sizes(bench, chosen.sizes, spec.solid_fraction):
+        raise ValueError("; ".join(faults))
+    return chosen
 
 
-def _read_arrays(path: Path) -> dict[str, Any]:
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            if not hasattr(archive, "files"):
-                raise SpecError(f"{path}: holds one array; an .npz with x and r is needed")
-            return {key: archive[key] for key in archive.files}
-    except FileNotFoundError:
-        raise SpecError(f"{path}: no such file") from None
-    except IsADirectoryError:
-        raise SpecError(f"{path}: is a folder; an .npz file is needed") from None
-    except (ValueError, EOFError, zipfile.BadZipFile, KeyError, OSError) as fault:
-        line = str(fault).splitlines()[0] if str(fault) else type(fault).__name__
-        raise SpecError(f"{path}: is no readable .npz file ({line})") from None
-
-
-def _missing_line(path: Path, key: str, found: list[str]) -> str:
-    names = ", ".join(found) or "nothing"
-    return f"{path}: {key}: is missing{nearest_name(key, found)}; the file holds {names}"
+def _choose(spec: BallsSpec, bench: Bench, design: Mapping[str, Any]) -> ChosenSizes:
+    if spec.fragments is None:
+        sizes = spec.unit_sizes()
+        if spec.mean_radius is not None:
+            return ChosenSizes(sizes._replace(radius=sizes.radius * spec.mean_radius))
+        return ChosenSizes(sizes_for_count(bench, sizes, spec.count or 0, spec.solid_fraction))
+    curve = fragment_curve(spec.fragments, bench, design)
+    largest = spec.fragments.largest or coarsest(curve)
+    smallest = spec.fragments.smallest
+    if smallest is None:
+        solid = spec.solid_fraction * bench_volume(bench)
+        smallest = smallest_for_count(curve, largest, solid, spec.count or 0)
+    cut = cut_sizes(curve, smallest, largest)
+    return ChosenSizes(cut.sizes, cut, curve)

@@ -15,20 +15,15 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from castblast.errors import SpecError, nearest_name
-from castblast.muckpile.bench import (
-    Bench,
-    block_shape,
-    check_bench,
-    echelon_delays,
-    row_delays,
-    v_delays,
-)
+from castblast.muckpile.bench import Bench, check_bench, polygon_bench
 from castblast.muckpile.contact import ContactLaw, DashpotMode
+from castblast.muckpile.outline import polygon_area
 from castblast.muckpile.packing import check_packing
-from castblast.muckpile.particles import FloatArray
 from castblast.resources import resource
+from castblast.specs.balls import BallsSpec
+from castblast.specs.firing import Direction, FiringPlan
 from castblast.specs.loading import Spec, load_spec
-from castblast.specs.quantity import QuantityError, QuantityIn, convert_variable
+from castblast.specs.quantity import QuantityError, QuantityIn, convert, convert_variable
 from castblast.variables import VARIABLES
 
 _FOLDER = "data_specs/benches"
@@ -38,13 +33,53 @@ _FROM_BENCH = ("burden", "spacing", "bench_height", "face_angle")
 _Length = Annotated[float, QuantityIn("m", above=0.0, upper=2000.0)]
 
 
-class BenchGeometry(Spec):
-    """The bench and what stands around it; blocks are one burden by one spacing in plan."""
+def _read_corners(value: object) -> tuple[tuple[float, float], ...]:
+    """Corners written as pairs of quantities, ``[-3 m, 0 m]``."""
+    if not isinstance(value, list | tuple) or len(value) < 3:
+        message = "at least three corners are needed, such as [-3 m, 0 m]"
+        raise QuantityError(message)
+    corners, faults = [], []
+    for k, corner in enumerate(value):
+        if not isinstance(corner, list | tuple) or len(corner) != 2:
+            faults.append(f"corner {k + 1}: {corner}: two lengths are needed, such as [-3 m, 0 m]")
+            continue
+        try:
+            corners.append((convert(corner[0], "m"), convert(corner[1], "m")))
+        except QuantityError as fault:
+            faults.append(f"corner {k + 1}: {corner}: {fault}")
+    if faults:
+        raise QuantityError("; ".join(faults))
+    return tuple(corners)
 
-    length: _Length
-    width: _Length
+
+class BenchGeometry(Spec):
+    """The bench and what stands around it; blocks are one burden by one spacing in plan.
+
+    Attributes
+    ----------
+    length, width : float [m]
+        Of a rectangle, along the face and across; left out if there is an outline.
+    height : float [m]
+    face_angle : float [rad]
+        Of the free faces over the horizontal.
+    outline : corners [x m, y m], optional
+        Polygon of the floor in plan, in either sense; its foremost point at x = 0, its least y 0.
+    edges : list of {"free", "rock", "open"}, optional
+        What lies beyond each edge, from corner k to the next; default: free towards the throw, rock
+        behind the bench, open at its ends.
+    burden, spacing : float [m]
+    rear, ends
+        Of a rectangle: whether rock stands behind it, and what is at its ends.
+    """
+
+    length: _Length | None = None
+    width: _Length | None = None
     height: _Length
     face_angle: Annotated[float, QuantityIn("rad", 0.1, _RIGHT_ANGLE + 1e-12)] = _RIGHT_ANGLE
+    outline: Annotated[tuple[tuple[float, float], ...], BeforeValidator(_read_corners)] | None = (
+        None
+    )
+    edges: tuple[Literal["free", "rock", "open"], ...] | None = None
     burden: _Length = 3.0
     spacing: _Length = 3.0
     rear: bool = True
@@ -52,70 +87,46 @@ class BenchGeometry(Spec):
 
     def to_bench(self) -> Bench:
         """Geometry as the discrete-element model takes it."""
-        return Bench(
-            self.length,
-            self.width,
+        angle = min(self.face_angle, _RIGHT_ANGLE)
+        if self.outline is None:
+            length, width = self.length or math.nan, self.width or math.nan
+            return Bench(length, width, self.height, angle, self.burden, self.spacing)
+        corners, edges = list(self.outline), list(self.edges or ())
+        if polygon_area(np.array(corners)) < 0.0:
+            # Turned round, the edge from corner k to k + 1 comes last but k.
+            corners.reverse()
+            edges = [*edges[-2::-1], *edges[-1:]]
+        return polygon_bench(
+            corners,
             self.height,
-            min(self.face_angle, _RIGHT_ANGLE),
-            self.burden,
-            self.spacing,
+            angle,
+            edges=tuple(edges),
+            burden=self.burden,
+            spacing=self.spacing,
         )
 
     @model_validator(mode="after")
     def _possible(self) -> BenchGeometry:
-        faults = check_bench(self.to_bench())
-        for block, side in (("burden", "width"), ("spacing", "length")):
-            size, room = getattr(self, block), getattr(self, side)
-            if size > room:
-                faults.append(f"{block} {size:g} m: the block is larger than the {side} {room:g} m")
+        sides = [name for name in ("length", "width") if getattr(self, name) is not None]
+        faults = []
+        if self.outline is None:
+            faults += [f"{n}: is missing" for n in ("length", "width") if n not in sides]
+            if self.edges is not None:
+                faults.append("edges: go with an outline")
+        else:
+            beside = [*sides, *({"rear", "ends"} & self.model_fields_set)]
+            faults += [f"{name}: means nothing beside an outline" for name in sorted(beside)]
+        if not faults:
+            bench = self.to_bench()
+            faults = check_bench(bench)
+            for block, side in (("burden", "width"), ("spacing", "length")):
+                size, room = getattr(bench, block), getattr(bench, side)
+                if size > room:
+                    faults.append(
+                        f"{block} {size:g} m: the block is larger than the {side} {room:g} m"
+                    )
         if faults:
             raise QuantityError("; ".join(faults))
-        return self
-
-
-class FiringPlan(Spec):
-    """Order and delay of the blocks; with pattern ``none`` the balls are loose from the start."""
-
-    pattern: Literal["echelon", "row", "v", "none"] = "echelon"
-    delay: Annotated[float, QuantityIn("s", 0.0, 10.0)] = 0.030
-    start: Annotated[float, QuantityIn("s", 0.0, 10.0)] = 0.0
-    hold_unfired: bool = True
-
-    def block_delay(self, bench: Bench) -> FloatArray:
-        """Firing time [s] of each block, (rows * columns,); inf: never fired."""
-        rows, columns = block_shape(bench)
-        if self.pattern == "none":
-            return np.full(rows * columns, np.inf)
-        plans = {"echelon": echelon_delays, "row": row_delays, "v": v_delays}
-        return plans[self.pattern](rows, columns, self.delay, self.start)
-
-
-class BallsSpec(Spec):
-    """Balls to pack (by mean radius or by number), or a file of balls.
-
-    Attributes
-    ----------
-    mean_radius : float [m], optional
-    count : int, optional
-        About this many balls; their mean radius follows.
-    file : str, optional
-        ``.npz`` with x (n, 3) and r (n,) in m, relative to the bench file.
-    relative_deviation : float [-]
-        Radii are uniform in mean radius times 1 -+ this.
-    solid_fraction : float [-]
-    """
-
-    mean_radius: Annotated[float, QuantityIn("m", 0.005, 10.0)] | None = None
-    count: Annotated[int, Field(ge=10, le=5_000_000)] | None = None
-    file: Annotated[str, Field(min_length=1)] | None = None
-    relative_deviation: Annotated[float, QuantityIn("1", 0.0, 0.8)] = 0.5
-    solid_fraction: Annotated[float, QuantityIn("1", 0.55, 0.63)] = 0.60
-
-    @model_validator(mode="after")
-    def _one_of_three(self) -> BallsSpec:
-        if sum(x is not None for x in (self.mean_radius, self.count, self.file)) != 1:
-            message = "exactly one of 'mean_radius', 'count' and 'file' is needed"
-            raise QuantityError(message)
         return self
 
 
@@ -155,19 +166,27 @@ class SlopeSpec(Spec):
     angle: Annotated[float, QuantityIn("rad", 0.01, _RIGHT_ANGLE)] = math.radians(30.0)
 
 
+class Numerics(Spec):
+    """How the equations are stepped; the default is the stability rule.
+
+    Attributes
+    ----------
+    time_step : float, optional [s]
+        A fixed step; refused if the packing cannot be stepped so.
+    step_safety : float [-]
+        Share of the stable step that is used.
+    """
+
+    time_step: Annotated[float, QuantityIn("s", above=0.0, upper=1.0)] | None = None
+    step_safety: Annotated[float, QuantityIn("1", 0.05, 0.95)] = 0.8
+
+
 class StopRule(Spec):
     """The end: translational energy below a share of its maximum for a while, or a longest time."""
 
     energy_ratio: Annotated[float, QuantityIn("1", 0.0, 0.5)] = 1e-4
     duration: Annotated[float, QuantityIn("s", 0.0, 10.0)] = 0.2
     longest_time: Annotated[float, QuantityIn("s", above=0.0, upper=600.0)] = 30.0
-
-
-class Direction(Spec):
-    """Direction of the throw: in plan from the normal of the face, and over the horizontal."""
-
-    azimuth: Annotated[float, QuantityIn("rad", -_RIGHT_ANGLE, _RIGHT_ANGLE)] = 0.0
-    elevation: Annotated[float, QuantityIn("rad", -_RIGHT_ANGLE, _RIGHT_ANGLE)] = 0.0
 
 
 def _read_design(value: object) -> dict[str, Any]:
@@ -207,15 +226,16 @@ class BenchSpec(Spec):
     bench : BenchGeometry
     firing : FiringPlan
     velocity : float [m s-1], optional
-        Initial velocity of every block.
+        Initial velocity of every block, or of those holes of a file that have none of their own.
     surrogate : mapping, optional
         Instead of `velocity`: explosive, rock and hole whose burden velocity a surrogate predicts;
         burden, spacing, height and face angle are those of the bench.
     direction : Direction
-    balls : BallsSpec, or the name of an ``.npz`` file
+    balls : BallsSpec, or the name of a file of balls
     contact : ContactSpec
     slope : SlopeSpec, optional
     stop : StopRule
+    numerics : Numerics
     seed : int
     notes : str
     """
@@ -230,6 +250,7 @@ class BenchSpec(Spec):
     contact: ContactSpec = ContactSpec()
     slope: SlopeSpec | None = None
     stop: StopRule = StopRule()
+    numerics: Numerics = Numerics()
     seed: Annotated[int, Field(ge=0)] = 0
     notes: str = ""
 
@@ -239,22 +260,20 @@ class BenchSpec(Spec):
         given = (self.velocity is not None) + (self.surrogate is not None)
         if self.firing.pattern == "none" and given:
             faults.append("firing.pattern 'none' takes no velocity")
-        if self.firing.pattern != "none" and given != 1:
+        if self.firing.pattern == "holes" and given == 2:
+            faults.append("either 'velocity' or 'surrogate', not both")
+        elif self.firing.pattern not in ("none", "holes") and given != 1:
             faults.append("either 'velocity' or 'surrogate' is needed")
         if self.balls.mean_radius is not None:
-            faults += self.room_faults(self.balls.mean_radius)
+            faults += check_packing(
+                self.bench.to_bench(),
+                self.balls.mean_radius,
+                self.balls.relative_deviation,
+                self.balls.solid_fraction,
+            )
         if faults:
             raise QuantityError("; ".join(faults))
         return self
-
-    def room_faults(self, mean_radius: float) -> list[str]:
-        """Say whether balls of a mean radius [m] are too large for the bench; []: they are not."""
-        return check_packing(
-            self.bench.to_bench(),
-            mean_radius,
-            self.balls.relative_deviation,
-            self.balls.solid_fraction,
-        )
 
     def design(self) -> dict[str, Any] | None:
         """Design for the surrogate in SI units, with the geometry of the bench; None without."""

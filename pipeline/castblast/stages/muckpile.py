@@ -2,30 +2,35 @@
 
 from __future__ import annotations
 
-import hashlib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from castblast.errors import SimulationError, SpecError, Status
-from castblast.files import write_with
-from castblast.kernel import source_hash
-from castblast.muckpile.bench import Bench, assign_blocks, block_shape, block_velocities
-from castblast.muckpile.packing import fill_bench, mean_radius_for_count
-from castblast.muckpile.particles import Particles, particles_at_rest
+from castblast.muckpile.bench import Bench
+from castblast.muckpile.enclosure import rock_walls
+from castblast.muckpile.initial_state import wall_faults
 from castblast.muckpile.metrics import pile_metrics
+from castblast.muckpile.particles import Particles
+from castblast.muckpile.simulation import Simulation
 from castblast.muckpile.solver import CastCase, run_cast
-from castblast.muckpile.walls import bench_walls
+from castblast.muckpile.threads import thread_count
+from castblast.muckpile.walls import Walls, bench_walls, join, slope
 from castblast.progress import ProgressCallback, silent
-from castblast.specs.balls import read_balls
-from castblast.specs.bench import BallsSpec, BenchSpec, find_bench, load_bench
-from castblast.specs.loading import make_spec
+from castblast.specs.balls import ChosenSizes
+from castblast.specs.bench import BenchSpec, find_bench, load_bench
 from castblast.specs.quantity import parse_quantity
-from castblast.stages.muckpile_results import MuckpileOutcome, Start, describe_run, write_results
+from castblast.stages.muckpile_plan import Plan, make_plan
+from castblast.stages.muckpile_results import MuckpileOutcome, describe_run, write_results
+from castblast.stages.muckpile_start import make_start
 
 _PACKING_SHARE, _CAST_SHARE = 0.25, 0.95
 _MAX_VELOCITY = 100.0
+_FEWEST_BALLS = 10
+#: Simulated time [s] that is enough for one step.
+_ONE_STEP = 1e-12
 
 
 def run_muckpile(
@@ -35,6 +40,7 @@ def run_muckpile(
     balls: int | None = None,
     threads: int | None = None,
     velocity: str | float | None = None,
+    packings: Path | None = None,
     progress: ProgressCallback = silent,
 ) -> MuckpileOutcome:
     """Run a bench file.
@@ -44,34 +50,45 @@ def run_muckpile(
     bench : str or path
         Bench file, or the name of one that comes with castblast.
     out : path, optional
-        Folder of the results; default ``runs/NAME``. A packing found there is used again if it was
-        made from the same numbers.
+        Folder of the results; default ``runs/NAME``.
     balls : int, optional
         About this many balls instead of those of the file; changes their size.
     threads : int, optional
         Default: all cores. The numbers do not depend on it.
     velocity : str or float [m s-1], optional
         Instead of that of the file; a text carries its unit.
+    packings : path, optional
+        Folder of packings, named by the hash of their content: one that is there is used again,
+        whatever run made it. Default: ``packings`` in `out`.
     progress : callback
 
     Raises
     ------
     SpecError
-        Faults of the bench file or of the file of balls.
+        Faults of the bench file, or of a file of balls or holes; a wall that cuts the balls, a
+        step above the stable one, too little memory. Nothing has been simulated then, and a
+        packing that was made is kept.
     SimulationError
         The simulation became unstable.
     """
     path = find_bench(bench)
     spec = _with_options(load_bench(path), balls, velocity)
     geometry = spec.bench.to_bench()
-    speed, prediction = _speed(spec)
+    plan = make_plan(spec, geometry, path.parent, one_speed=velocity is not None)
     folder = Path("runs") / spec.name if out is None else out
-    folder.mkdir(parents=True, exist_ok=True)
     threads = threads or 0
-    start = _start(
-        spec, geometry, path.parent, folder, threads, _part(progress, 0.0, _PACKING_SHARE)
+    start, sizes = make_start(
+        spec,
+        geometry,
+        plan,
+        path.parent,
+        folder / "packings" if packings is None else packings,
+        threads,
+        _part(progress, 0.0, _PACKING_SHARE),
     )
-    case = _case(spec, geometry, start.balls, speed, threads)
+    folder.mkdir(parents=True, exist_ok=True)
+    case = _case(spec, geometry, start.balls, plan, threads)
+    _require_possible(spec, case)
     result = run_cast(case, _part(progress, _PACKING_SHARE, _CAST_SHARE))
     if Status(result.status) is Status.UNSTABLE_STEP:
         message = (
@@ -87,7 +104,8 @@ def run_muckpile(
         block_velocity=case.block_velocity,
         walls=case.walls,
     )
-    outcome = describe_run(spec, speed, prediction, start, result, metrics)
+    outcome = describe_run(spec, plan.speed, plan.prediction, start, result, metrics)
+    outcome = replace(outcome, document=outcome.document | {"fragments": _describe_sizes(sizes)})
     files = write_results(folder, spec, case, result, outcome.document)
     progress(1.0, f"{result.time:.1f} s simulated")
     return MuckpileOutcome(outcome.document, outcome.title, outcome.rows, files)
@@ -100,8 +118,12 @@ def _with_options(spec: BenchSpec, balls: int | None, velocity: str | float | No
         if spec.balls.file is not None:
             message = f"--balls: {spec.name} takes its balls from {spec.balls.file}"
             raise SpecError(message)
-        made = spec.balls.model_dump() | {"count": balls, "mean_radius": None}
-        update["balls"] = make_spec(made, BallsSpec, "--balls")
+        made: dict[str, Any] = {"count": balls, "mean_radius": None}
+        if spec.balls.fragments is not None:
+            made["fragments"] = spec.balls.fragments.model_copy(update={"smallest": None})
+        update["balls"] = spec.balls.model_copy(update=made)
+        if balls < _FEWEST_BALLS:
+            raise SpecError(f"--balls: {balls}: at least {_FEWEST_BALLS} are needed")
     if velocity is not None:
         if isinstance(velocity, str):
             velocity = parse_quantity(velocity, "m s-1", "--velocity")
@@ -117,19 +139,6 @@ def _with_options(spec: BenchSpec, balls: int | None, velocity: str | float | No
     return spec.model_copy(update=update)
 
 
-def _speed(spec: BenchSpec) -> tuple[float, dict[str, Any] | None]:
-    """Initial velocity [m s-1] of the blocks, and the prediction it comes from."""
-    design = spec.design()
-    if design is None:
-        return spec.velocity or 0.0, None
-    from castblast.stages.predict import predict
-
-    values = {name: value for name, value in design.items() if name != "explosive"}
-    answer = predict(values, design["explosive"])
-    kept = ("explosive", "burden_velocity", "inputs", "in_domain", "domain_faults", "model")
-    return answer["burden_velocity"], {key: answer[key] for key in kept}
-
-
 def _part(progress: ProgressCallback, low: float, high: float) -> ProgressCallback:
     """Progress of one part of the run; the share, an estimate there, never falls."""
     reached = 0.0
@@ -142,111 +151,79 @@ def _part(progress: ProgressCallback, low: float, high: float) -> ProgressCallba
     return report
 
 
-def _start(
-    spec: BenchSpec,
-    bench: Bench,
-    beside: Path,
-    folder: Path,
-    threads: int,
-    progress: ProgressCallback,
-) -> Start:
-    """Read the balls, or pack them, or take the packing of an earlier run from `folder`."""
-    if spec.balls.file is not None:
-        balls = read_balls(beside / spec.balls.file)
-        if spec.firing.pattern != "none" and (balls.block < 0).all():
-            balls = balls._replace(block=assign_blocks(balls.position, bench))
-        return Start(balls)
-    key, cache = _packing_key(spec), folder / "packing.npz"
-    stored = _read_packing(cache, key)
-    if stored is not None:
-        progress(1.0, "packing of an earlier run")
-        return stored
-    radius = spec.balls.mean_radius
-    if radius is None:
-        assert spec.balls.count is not None
-        radius = mean_radius_for_count(
-            bench, spec.balls.count, spec.balls.relative_deviation, spec.balls.solid_fraction
-        )
-    faults = spec.room_faults(radius)
-    if faults:
-        raise SpecError("\n".join(f"{spec.name}: {fault}" for fault in faults))
-    packing = fill_bench(
-        bench,
-        mean_radius=radius,
-        relative_deviation=spec.balls.relative_deviation,
-        solid_fraction=spec.balls.solid_fraction,
-        seed=spec.seed,
-        law=spec.contact.to_law(),
-        threads=threads,
-        progress=progress,
-    )
-    if Status(packing.status) is Status.UNSTABLE_STEP:
-        message = f"{spec.name}: the bench could not be packed: {Status(packing.status).meaning}"
-        raise SimulationError(message)
-    settled = Status(packing.status) is Status.OK
-    start = Start(packing.particles, float(packing.solid_fraction), settled=settled)
-    _write_packing(cache, key, start)
-    return start
-
-
-def _packing_key(spec: BenchSpec) -> str:
-    """Hash of all that a packing depends on, the code included."""
-    parts = [spec.bench.sha256(), spec.balls.sha256(), spec.contact.sha256(), str(spec.seed)]
-    parts.append(source_hash(("kernel.py", "muckpile")))
-    return hashlib.sha256(" ".join(parts).encode()).hexdigest()
-
-
-def _read_packing(path: Path, key: str) -> Start | None:
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            if str(stored["key"]) != key:
-                return None
-            balls = particles_at_rest(stored["x"], stored["r"], stored["block"])
-            fraction, settled = float(stored["solid_fraction"]), bool(stored["settled"])
-            return Start(balls, fraction, settled=settled, reused=True)
-    except (OSError, ValueError, KeyError, EOFError):
+def _describe_sizes(chosen: ChosenSizes | None) -> dict[str, Any] | None:
+    """What fragments the balls stand for, and what share of their mass is left out."""
+    if chosen is None or chosen.cut is None or chosen.curve is None:
         return None
-
-
-def _write_packing(path: Path, key: str, start: Start) -> None:
-    balls = start.balls
-    arrays: dict[str, Any] = {
-        "key": np.array(key),
-        "x": balls.position,
-        "r": balls.radius,
-        "block": balls.block,
-        "solid_fraction": np.array(start.solid_fraction),
-        "settled": np.array(start.settled),
+    cut = chosen.cut
+    return {
+        "curve": type(chosen.curve).__name__.lower(),
+        **chosen.curve._asdict(),
+        "smallest_ball": cut.smallest,
+        "largest_ball": cut.largest,
+        "mass_share_finer": cut.finer,
+        "mass_share_coarser": cut.coarser,
     }
-    write_with(path, lambda name: np.savez(name, **arrays))
 
 
-def _case(spec: BenchSpec, bench: Bench, balls: Particles, speed: float, threads: int) -> CastCase:
-    rows, columns = block_shape(bench)
-    slope = spec.slope
-    walls = bench_walls(
-        bench,
-        rear=spec.bench.rear,
-        ends=spec.bench.ends,
-        slope_distance=slope.distance if slope else None,
-        **({"slope_angle": slope.angle} if slope else {}),
-    )
+def _walls(spec: BenchSpec, bench: Bench) -> Walls:
+    ahead = spec.slope
+    if not bench.corners:
+        return bench_walls(
+            bench,
+            rear=spec.bench.rear,
+            ends=spec.bench.ends,
+            slope_distance=ahead.distance if ahead else None,
+            **({"slope_angle": ahead.angle} if ahead else {}),
+        )
+    walls = rock_walls(bench)
+    return walls if ahead is None else join(walls, slope(ahead.distance, ahead.angle))
+
+
+def _case(spec: BenchSpec, bench: Bench, balls: Particles, plan: Plan, threads: int) -> CastCase:
     if spec.firing.pattern == "none":
         balls = balls._replace(block=np.full_like(balls.block, -1))
     return CastCase(
         particles=balls,
         law=spec.contact.to_law(),
-        walls=walls,
-        block_delay=spec.firing.block_delay(bench),
-        block_velocity=block_velocities(
-            speed,
-            rows * columns,
-            azimuth=spec.direction.azimuth,
-            elevation=spec.direction.elevation,
-        ),
+        walls=_walls(spec, bench),
+        block_delay=plan.delay,
+        block_velocity=plan.velocity,
         hold_unfired=spec.firing.hold_unfired,
         max_time=spec.stop.longest_time,
         stop_energy_ratio=spec.stop.energy_ratio,
         stop_duration=spec.stop.duration,
+        step_safety=spec.numerics.step_safety,
+        time_step=spec.numerics.time_step or 0.0,
         threads=threads,
     )
+
+
+def _require_possible(spec: BenchSpec, case: CastCase) -> None:
+    """Refuse walls that cut the balls, and a fixed step above the stable one."""
+    faults = [f"{spec.name}: {fault}" for fault in wall_faults(case.particles, case.walls)]
+    if not faults and case.time_step > 0.0:
+        stable = _stable_step(case)
+        if case.time_step > stable:
+            faults.append(
+                f"{spec.name}: numerics.time_step: {case.time_step:.3g} s: above the stable step "
+                f"of these balls, {stable:.3g} s; leave it out to follow the stability rule"
+            )
+    if faults:
+        raise SpecError("\n".join(faults))
+
+
+def _stable_step(case: CastCase) -> float:
+    """Stable step [s] of the balls where they are."""
+    held = np.zeros(len(case.particles.radius), dtype=np.bool_)
+    with thread_count(case.threads):
+        run = Simulation(
+            case.particles,
+            case.law,
+            case.walls,
+            held,
+            step_safety=1.0,
+            ballistic=False,
+        )
+        run.run(_ONE_STEP, np.inf)
+    return float(run.smallest_step)

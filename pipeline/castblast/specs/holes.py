@@ -1,0 +1,187 @@
+"""A CSV file of blast holes: where they stand, when they fire, and what is special about each."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from castblast.errors import SpecError
+from castblast.muckpile.bench import Bench, assign_blocks, bench_outline, block_centres
+from castblast.muckpile.outline import depth_inside
+from castblast.muckpile.particles import FloatArray, IntArray
+from castblast.specs.quantity import QuantityError, convert_variable
+from castblast.specs.table import Table, read_table
+from castblast.variables import INPUT_NAMES, VARIABLES
+
+_UNITS = {
+    "x": "m",
+    "y": "m",
+    "delay": "s",
+    "velocity": "m s-1",
+    "direction": "rad",
+    "elevation": "rad",
+    "charge_mass": "kg",
+}
+_FROM_BENCH = ("bench_height", "face_angle")
+_LARGEST = {"velocity": 100.0, "delay": 60.0}
+#: Two holes closer than this share of burden and spacing are one, where balls go to the nearest.
+_TOO_CLOSE = 0.25
+
+
+class Holes(NamedTuple):
+    """Holes of a plan, n of them.
+
+    Attributes
+    ----------
+    place : array (n, 2) [m]
+    delay : array (n,) [s]
+    velocity : array (n,) [m s-1]
+        NaN: that of the bench file.
+    direction, elevation : array (n,) [rad]
+        Of the throw; NaN: that of the bench file.
+    design : list of dict
+        Explosive and variables in SI units in which a hole differs from the design of the bench
+        file; ``charge_mass`` [kg] besides.
+    where : list of str
+        File and line of each hole, for messages.
+    """
+
+    place: FloatArray
+    delay: FloatArray
+    velocity: FloatArray
+    direction: FloatArray
+    elevation: FloatArray
+    design: list[dict[str, Any]]
+    where: list[str]
+
+
+def read_holes(path: Path, bench: Bench, *, by_block: bool) -> Holes:
+    """Read and check a file of holes.
+
+    Parameters
+    ----------
+    path : Path
+        CSV with ``x [m], y [m], delay [ms]``, optionally ``velocity [m/s]``, ``direction [deg]``,
+        ``elevation [deg]``, ``explosive``, ``charge_mass [kg]`` and any input variable.
+    bench : Bench
+        Holes must stand inside it.
+    by_block : bool
+        Each hole has a block of burden by spacing to itself; otherwise holes may stand anywhere but
+        on the same spot.
+
+    Raises
+    ------
+    SpecError
+        One line per fault, with file and line.
+    """
+    inputs = {name: VARIABLES[name].unit for name in INPUT_NAMES if name not in _FROM_BENCH}
+    table = read_table(path, _UNITS | inputs, ("x", "y", "delay"), ("explosive",))
+    place = np.column_stack([table.number["x"], table.number["y"]])
+    faults = _value_faults(table) + _place_faults(table, place, bench)
+    faults += _shared_blocks(table, place, bench) if by_block else _close(table, place, bench)
+    if faults:
+        raise SpecError("\n".join(faults))
+    number = table.number
+    nothing = np.full(len(place), np.nan)
+    return Holes(
+        place,
+        number["delay"],
+        number.get("velocity", nothing),
+        number.get("direction", nothing),
+        number.get("elevation", nothing),
+        _designs(table),
+        [f"{path}: line {line}" for line in table.line],
+    )
+
+
+def blocks_of_holes(holes: Holes, bench: Bench) -> IntArray:
+    """Return the hole (blocks,) that fires each block; -1: none.
+
+    A block without a hole of its own goes with the nearest one within the diagonal of a block, so
+    that the ends of staggered rows are not left standing.
+    """
+    own = assign_blocks(_level(holes.place), bench)
+    centre = block_centres(bench)
+    away = np.linalg.norm(centre[:, None, :] - holes.place[None, :, :], axis=2)
+    nearest = np.argmin(away, axis=1)
+    reach = float(np.hypot(bench.burden, bench.spacing))
+    hole = np.where(away[np.arange(len(centre)), nearest] <= reach, nearest, -1)
+    hole[own] = np.arange(len(own))
+    return np.asarray(hole, dtype=np.int64)
+
+
+def _level(place: FloatArray) -> FloatArray:
+    return np.column_stack([place, np.zeros(len(place))])
+
+
+def _value_faults(table: Table) -> list[str]:
+    faults = []
+    for name, largest in _LARGEST.items():
+        for line, value in zip(table.line, table.number.get(name, ()), strict=False):
+            if value < 0.0 or value > largest:
+                faults.append(
+                    f"{table.path}: line {line}: {name}: {value:g} {_UNITS[name]}: implausible; "
+                    f"allowed: 0 to {largest:g} {_UNITS[name]}"
+                )
+    for name in table.number:
+        if name not in INPUT_NAMES:
+            continue
+        for line, value in zip(table.line, table.number[name], strict=True):
+            try:
+                if np.isfinite(value):
+                    convert_variable(name, f"{value!r} {VARIABLES[name].unit}")
+            except QuantityError as fault:
+                faults.append(f"{table.path}: line {line}: {name}: {fault}")
+    return faults
+
+
+def _place_faults(table: Table, place: FloatArray, bench: Bench) -> list[str]:
+    outside = depth_inside(bench_outline(bench), _level(place)) < -1e-9
+    return [
+        f"{table.path}: line {table.line[k]}: the hole at x = {place[k, 0]:g} m, y = "
+        f"{place[k, 1]:g} m stands outside the bench, {-bench.width:g} to 0 m in x and 0 to "
+        f"{bench.length:g} m in y"
+        for k in np.flatnonzero(outside)
+    ]
+
+
+def _shared_blocks(table: Table, place: FloatArray, bench: Bench) -> list[str]:
+    first: dict[int, int] = {}
+    faults = []
+    for k, block in enumerate(assign_blocks(_level(place), bench).tolist()):
+        if block in first:
+            faults.append(
+                f"{table.path}: lines {table.line[first[block]]} and {table.line[k]}: two holes "
+                f"on block {block}, {bench.burden:g} x {bench.spacing:g} m; set 'firing.blocks: "
+                f"nearest_hole' for holes off the grid"
+            )
+        first.setdefault(block, k)
+    return faults
+
+
+def _close(table: Table, place: FloatArray, bench: Bench) -> list[str]:
+    from scipy.spatial import cKDTree
+
+    reach = _TOO_CLOSE * min(bench.burden, bench.spacing)
+    return [
+        f"{table.path}: lines {table.line[i]} and {table.line[j]}: two holes on one block, "
+        f"{np.linalg.norm(place[i] - place[j]):.2g} m apart; at least {reach:g} m is needed"
+        for i, j in sorted(cKDTree(place).query_pairs(reach))
+    ]
+
+
+def _designs(table: Table) -> list[dict[str, Any]]:
+    names = [name for name in table.number if name in INPUT_NAMES or name == "charge_mass"]
+    designs: list[dict[str, Any]] = []
+    for k in range(len(table.line)):
+        design: dict[str, Any] = {
+            name: float(table.number[name][k])
+            for name in names
+            if np.isfinite(table.number[name][k])
+        }
+        if table.text.get("explosive", [""] * len(table.line))[k]:
+            design["explosive"] = table.text["explosive"][k]
+        designs.append(design)
+    return designs

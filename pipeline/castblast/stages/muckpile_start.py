@@ -1,0 +1,143 @@
+"""Balls before firing: read from a file, taken from an earlier packing, or packed."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from castblast.errors import SimulationError, SpecError, Status
+from castblast.files import write_with
+from castblast.kernel import source_hash
+from castblast.muckpile.bench import Bench, bench_outline
+from castblast.muckpile.packing import count_of, fill_bench
+from castblast.muckpile.particles import particles_at_rest
+from castblast.muckpile.sizes import Sizes
+from castblast.progress import ProgressCallback
+from castblast.specs.ball_files import read_balls
+from castblast.specs.balls import ChosenSizes, choose_sizes
+from castblast.specs.bench import BenchSpec
+from castblast.stages.muckpile_memory import require_memory
+from castblast.stages.muckpile_plan import Plan
+from castblast.stages.muckpile_results import Start
+
+
+def make_start(
+    spec: BenchSpec,
+    bench: Bench,
+    plan: Plan,
+    beside: Path,
+    packings: Path,
+    threads: int,
+    progress: ProgressCallback,
+) -> tuple[Start, ChosenSizes | None]:
+    """Read the balls, or pack them, or take a packing of the same content from `packings`.
+
+    Parameters
+    ----------
+    spec : BenchSpec
+    bench : Bench
+    plan : Plan
+        Says which block a ball belongs to.
+    beside : Path
+        Folder of the bench file.
+    packings : Path
+        Folder of packings, named by the hash of all they depend on.
+    threads : int
+    progress : callable
+
+    Raises
+    ------
+    SpecError
+        Faults of a file of balls, balls that do not fit the bench or the memory.
+    SimulationError
+        The packing became unstable.
+    """
+    if spec.balls.file is not None:
+        path = beside / spec.balls.file
+        balls = read_balls(path)
+        require_memory(len(balls.radius), spec.name)
+        if (balls.block < 0).all():
+            balls = balls._replace(block=plan.blocks_of(balls.position, bench))
+        elif balls.block.max() >= len(plan.delay):
+            raise SpecError(
+                f"{path}: block: {balls.block.max()} of ball {int(balls.block.argmax())}: the "
+                f"plan has the blocks 0 to {len(plan.delay) - 1}"
+            )
+        return Start(balls), None
+    try:
+        chosen = choose_sizes(spec.balls, bench, spec.design() or {})
+    except ValueError as fault:
+        raise SpecError(f"{spec.name}: balls: {fault}") from None
+    require_memory(count_of(bench, chosen.sizes, spec.balls.solid_fraction), spec.name)
+    key = _packing_key(spec, bench, chosen.sizes)
+    path = packings / f"{key[:16]}.npz"
+    start = _read_packing(path, key)
+    if start is None:
+        start = _pack(spec, bench, chosen.sizes, threads, progress)
+        _write_packing(path, key, start)
+    else:
+        progress(1.0, "packing of an earlier run")
+    block = plan.blocks_of(start.balls.position, bench)
+    return start._replace(balls=start.balls._replace(block=block)), chosen
+
+
+def _pack(
+    spec: BenchSpec, bench: Bench, sizes: Sizes, threads: int, progress: ProgressCallback
+) -> Start:
+    try:
+        packing = fill_bench(
+            bench,
+            sizes=sizes,
+            solid_fraction=spec.balls.solid_fraction,
+            seed=spec.seed,
+            law=spec.contact.to_law(),
+            threads=threads,
+            progress=progress,
+        )
+    except ValueError as fault:
+        raise SpecError(f"{spec.name}: {fault}") from None
+    if Status(packing.status) is Status.UNSTABLE_STEP:
+        message = f"{spec.name}: the bench could not be packed: {Status(packing.status).meaning}"
+        raise SimulationError(message)
+    settled = Status(packing.status) is Status.OK
+    return Start(packing.particles, float(packing.solid_fraction), settled=settled)
+
+
+def _packing_key(spec: BenchSpec, bench: Bench, sizes: Sizes) -> str:
+    """Hash of all that a packing depends on, the code included; not of blocks and firing."""
+    outline = bench_outline(bench)
+    numbers = (outline.corner, outline.lean, sizes.radius, sizes.below)
+    digest = hashlib.sha256()
+    for array in numbers:
+        digest.update(np.ascontiguousarray(array, dtype="<f8").tobytes())
+        digest.update(b"/")
+    parts = [repr(bench.height), repr(spec.balls.solid_fraction), spec.contact.sha256()]
+    parts += [str(spec.seed), source_hash(("kernel.py", "muckpile"))]
+    digest.update(" ".join(parts).encode())
+    return digest.hexdigest()
+
+
+def _read_packing(path: Path, key: str) -> Start | None:
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            if str(stored["key"]) != key:
+                return None
+            balls = particles_at_rest(stored["x"], stored["r"])
+            fraction, settled = float(stored["solid_fraction"]), bool(stored["settled"])
+            return Start(balls, fraction, settled=settled, reused=True)
+    except (OSError, ValueError, KeyError, EOFError):
+        return None
+
+
+def _write_packing(path: Path, key: str, start: Start) -> None:
+    arrays: dict[str, Any] = {
+        "key": np.array(key),
+        "x": start.balls.position,
+        "r": start.balls.radius,
+        "solid_fraction": np.array(start.solid_fraction),
+        "settled": np.array(start.settled),
+    }
+    write_with(path, lambda name: np.savez(name, **arrays))
