@@ -7,9 +7,10 @@ from math import pi, radians
 import numpy as np
 import pytest
 
-from castblast.muckpile.bench import Bench
+from castblast.muckpile.bench import Bench, polygon_bench
 from castblast.muckpile.walls import bench_walls
 from castblast.report.ball_picture import PLAN_X, PLAN_Y, SECTION, Canvas, oblique
+from castblast.report.bench_lines import bench_sections
 from castblast.report.ground import ground_points
 
 WHITE, RED, BLUE = np.ones((1, 3)), np.array([[1.0, 0, 0]]), np.array([[0, 0, 1.0]])
@@ -90,3 +91,21 @@ def test_ground_has_no_gap_at_a_face():
     assert heights[0] <= 0.5
     # Ahead of the bench the floor is level.
     np.testing.assert_allclose(place[place[:, 0] > 0.1, 2], 0.0, atol=1e-12)
+
+
+def test_section_of_a_bench_with_a_leaning_face():
+    """Face of 45 degrees, 5 m high: the crest lies 5 m behind the toe, the rear is vertical."""
+    bench = Bench(length=6.0, width=9.0, height=5.0, face_angle=radians(45))
+    for y in (0.0, 3.0, 6.0):
+        (ring,) = bench_sections(bench, y)
+        np.testing.assert_allclose(ring, [[-9, 0], [0, 0], [-5, 5], [-9, 5], [-9, 0]], atol=1e-6)
+
+
+def test_section_of_a_bench_with_a_bay():
+    """U shape with a bay from the rear at 4 < y < 6, where only the front bar is cut."""
+    corners = [(0, 0), (0, 10), (-8, 10), (-8, 6), (-3, 6), (-3, 4), (-8, 4), (-8, 0)]
+    bench = polygon_bench(corners, 4.0)
+    (ring,) = bench_sections(bench, 5.0)
+    assert sorted(set(ring[:, 0])) == [-3.0, 0.0]
+    (ring,) = bench_sections(bench, 2.0)
+    assert sorted(set(ring[:, 0])) == [-8.0, 0.0]

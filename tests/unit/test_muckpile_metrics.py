@@ -13,9 +13,10 @@ from castblast.muckpile.ballistic import (
     block_throw,
     level_reach,
 )
-from castblast.muckpile.bench import Bench
+from castblast.muckpile.bench import Bench, polygon_bench
 from castblast.muckpile.metrics import UNITS, PileMetrics, band, metric_bands, pile_metrics
 from castblast.muckpile.particles import centre_of_mass, particles_at_rest
+from castblast.muckpile.profile import face_line
 from castblast.muckpile.walls import floor, join, slope
 
 
@@ -151,9 +152,10 @@ def test_ballistic_cast_of_a_bench(width):
     assert level_reach(speed, height) == pytest.approx(20.274, abs=1e-3)
     assert cast.throw[0] == pytest.approx(block_throw(speed, height), rel=1e-3)
     assert cast.block_throw[0, 0] == pytest.approx(cast.throw[0])
-    assert cast.cast_fraction == pytest.approx(bench_cast_fraction(speed, width, height), abs=2e-3)
-    assert cast.flight_time == pytest.approx(sqrt(2.0 * height / 9.81), rel=3e-3)
-    assert cast.runout_95 < cast.runout_99 < level_reach(speed, height)
+    past = float(np.mean(cast.landing[:, 0] > 0.0))
+    assert past == pytest.approx(bench_cast_fraction(speed, width, height), abs=2e-3)
+    assert cast.flight_time.max() == pytest.approx(sqrt(2.0 * height / 9.81), rel=3e-3)
+    assert cast.landing[:, 0].max() < level_reach(speed, height)
 
 
 def test_ballistic_share_is_continuous_where_the_reach_is_the_width():
@@ -184,3 +186,19 @@ def test_ballistic_throw_upwards_goes_farther():
     ball = particles_at_rest([[0.0, 0.0, 1e-6]], [1e-6], block=[0])
     launch = np.array([[10.0, 0.0, 10.0]]) / sqrt(2.0)
     assert ballistic_cast(ball, launch).throw[0] == pytest.approx(100.0 / 9.81)
+
+
+def test_face_line_of_a_bench_of_any_shape():
+    """Front edge from (-2, 0) to (0, 10), then straight to (0, 20); rear at x = -8."""
+    corners = [(-2.0, 0.0), (0.0, 10.0), (0.0, 20.0), (-8.0, 20.0), (-8.0, 0.0)]
+    bench = polygon_bench(corners, 5.0)
+    y = np.array([-3.0, 0.0, 5.0, 10.0, 15.0, 20.0, 25.0])
+    np.testing.assert_allclose(face_line(bench, y), [-2.0, -2.0, -1.0, 0.0, 0.0, 0.0, 0.0])
+    np.testing.assert_array_equal(face_line(Bench(), y), np.zeros(7))
+    # A ball at x = -0.5 lies past the oblique part and not past the straight one.
+    before = particles_at_rest([[-3.0, 5.0, 0.1], [-3.0, 15.0, 0.1]], [0.1, 0.1], block=[0, 0])
+    after = before._replace(position=np.array([[-0.5, 5.0, 0.1], [-0.5, 15.0, 0.1]]))
+    metrics = pile_metrics(before, after, bench, block_velocity=np.zeros((40, 3)))
+    assert metrics.cast_fraction == pytest.approx(0.5)
+    assert metrics.runout_99 == pytest.approx(0.5)
+    assert metrics.ballistic_cast_fraction == 0.0

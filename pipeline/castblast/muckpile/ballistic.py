@@ -16,7 +16,6 @@ import numpy as np
 
 from castblast.muckpile.movement import group_movement
 from castblast.muckpile.particles import FloatArray, Particles
-from castblast.muckpile.profile import mass_quantile
 from castblast.muckpile.walls import Walls, ground_height
 
 _BISECTIONS = 40
@@ -31,20 +30,15 @@ class BallisticCast(NamedTuple):
         Displacement of the centre of mass.
     block_throw : array (b, 3) [m]
         The same for each block; NaN for a block without balls.
-    cast_fraction : float [-]
-        Share of the mass that comes down past the face line, x > 0.
-    runout_95, runout_99 : float [m]
-        Distance from the face line that this share of the mass does not pass.
-    flight_time : float [s]
-        Longest.
+    landing : array (n, 3) [m]
+        Centre of each ball where it comes down.
+    flight_time : array (n,) [s]
     """
 
     throw: FloatArray
     block_throw: FloatArray
-    cast_fraction: float
-    runout_95: float
-    runout_99: float
-    flight_time: float
+    landing: FloatArray
+    flight_time: FloatArray
 
 
 def level_reach(speed: float, height: float, gravity: float = 9.81) -> float:
@@ -93,15 +87,7 @@ def ballistic_cast(
     landed = before._replace(position=end)
     every = group_movement(before, landed, np.zeros(len(end), dtype=np.int64), 1)
     blocks = group_movement(before, landed, before.block, len(block_velocity))
-    x = end[:, 0]
-    return BallisticCast(
-        every.displacement[0],
-        blocks.displacement,
-        float(np.average(x > 0.0, weights=before.radius**3)),
-        mass_quantile(x, before.radius, 0.95),
-        mass_quantile(x, before.radius, 0.99),
-        float(time.max(initial=0.0)),
-    )
+    return BallisticCast(every.displacement[0], blocks.displacement, end, time)
 
 
 def _landing(

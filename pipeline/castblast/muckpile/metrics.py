@@ -1,7 +1,9 @@
 """What a cast did to a bench, in numbers, and the band of each number over repeated casts.
 
-All lengths along x count from the original face line, the toe of the free face at x = 0. Balls
-have one density, so shares of mass are shares of ball volume.
+Lengths in the direction of throw, x, count from the original face line: the toe of the free face
+at x = 0, or the foremost edge of a bench of another shape at the same place along it. Rock that
+leaves such a bench over another free face is not counted as cast. Balls have one density, so
+shares of mass are shares of ball volume.
 """
 
 from __future__ import annotations
@@ -18,14 +20,13 @@ from castblast.muckpile.movement import group_movement
 from castblast.muckpile.particles import FloatArray, IntArray, Particles, centre_of_mass
 from castblast.muckpile.profile import (
     HeightField,
+    face_line,
     mass_quantile,
     mean_profile,
     repose_angle,
     surface_height,
 )
 from castblast.muckpile.walls import Walls, ground_height
-
-_TOP_SHARE = 0.99
 
 
 class PileMetrics(NamedTuple):
@@ -41,7 +42,7 @@ class PileMetrics(NamedTuple):
     block_spread : array (b, 3) [m]
         Standard deviation of the displacements of the balls of each block.
     cast_fraction : float [-]
-        Share of the mass past the original face line, x > 0.
+        Share of the mass past the original face line.
     runout_95, runout_99 : float [m]
         Distance from the face line that this share of the mass does not pass (per cent).
     maximum_height : float [m]
@@ -127,19 +128,20 @@ def pile_metrics(
     gravity : float [m s-2]
     """
     mass = after.radius**3
-    x = after.position[:, 0]
+    ahead = _ahead(after.position, bench)
     field = _height_over_ground(after, walls)
     volume = float(np.sum(field.height)) * _cell_area(field)
     squares = float(np.sum(field.height**2)) * _cell_area(field)
     blocks = group_movement(before, after, before.block, len(block_velocity))
     free = ballistic_cast(before, block_velocity, walls=walls, gravity=gravity)
+    free_ahead = _ahead(free.landing, bench)
     return PileMetrics(
         throw=centre_of_mass(after) - centre_of_mass(before),
         block_throw=blocks.displacement,
         block_spread=blocks.spread,
-        cast_fraction=float(np.average(x > 0.0, weights=mass)),
-        runout_95=mass_quantile(x, after.radius, 0.95),
-        runout_99=mass_quantile(x, after.radius, _TOP_SHARE),
+        cast_fraction=float(np.average(ahead > 0.0, weights=mass)),
+        runout_95=mass_quantile(ahead, after.radius, 0.95),
+        runout_99=mass_quantile(ahead, after.radius, 0.99),
         maximum_height=float(np.max(field.height)),
         dig_height=squares / volume if volume > 0.0 else 0.0,
         pile_volume=volume,
@@ -147,9 +149,14 @@ def pile_metrics(
         rock_swell=volume / (4.0 / 3.0 * np.pi * float(np.sum(mass))),
         repose_angle=repose_angle(mean_profile(field)),
         ballistic_throw=float(free.throw[0]),
-        ballistic_cast_fraction=free.cast_fraction,
-        ballistic_runout_99=free.runout_99,
+        ballistic_cast_fraction=float(np.average(free_ahead > 0.0, weights=mass)),
+        ballistic_runout_99=mass_quantile(free_ahead, after.radius, 0.99),
     )
+
+
+def _ahead(position: FloatArray, bench: Bench) -> FloatArray:
+    """Distance (n,) [m] of centres (n, 3) from the face line, positive past it."""
+    return np.asarray(position[:, 0] - face_line(bench, position[:, 1]))
 
 
 def _height_over_ground(after: Particles, walls: Walls | None) -> HeightField:

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from castblast.kernel import kernel
+from castblast.muckpile.bench import Bench
 from castblast.muckpile.particles import FloatArray
 
 
@@ -150,3 +151,20 @@ def mass_quantile(value: FloatArray, radius: FloatArray, share: float) -> float:
     mass = np.cumsum(radius[order] ** 3)
     at = int(np.searchsorted(mass, share * mass[-1]))
     return float(value[order[min(at, len(order) - 1)]])
+
+
+def face_line(bench: Bench, y: FloatArray) -> FloatArray:
+    """Return x (n,) [m] of the foremost edge of the bench on the floor at the places y (n,) [m].
+
+    0 for a rectangular bench. Beyond the ends of a bench of another shape: that at its end.
+    """
+    if not bench.corners:
+        return np.zeros(np.shape(y))
+    corner = np.array(bench.corners)
+    place = np.clip(y, corner[:, 1].min(), corner[:, 1].max())
+    foremost = np.full(np.shape(y), -np.inf)
+    for (ax, ay), (bx, by) in zip(corner, np.roll(corner, -1, axis=0), strict=True):
+        over = (place >= min(ay, by)) & (place <= max(ay, by))
+        x = ax + (place - ay) * ((bx - ax) / (by - ay)) if ay != by else max(ax, bx)
+        foremost = np.where(over, np.maximum(foremost, x), foremost)
+    return foremost

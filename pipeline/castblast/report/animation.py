@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 
 from castblast.errors import SpecError
 from castblast.files import write_with
-from castblast.muckpile.bench import Bench, crest_position
+from castblast.muckpile.bench import Bench
 from castblast.muckpile.particles import Particles
 from castblast.report.ball_picture import SECTION, Canvas
+from castblast.report.bench_lines import draw_bench_section
 from castblast.report.blocks import block_colours, shown_range
-from castblast.report.ground import INK, draw_ground_line
+from castblast.report.ground import draw_ground_line
 from castblast.report.muckpile_view import Scene
 from castblast.report.style import in_style, new_figure
 
@@ -159,9 +160,7 @@ class Animation:
         canvas.add(balls.position[seen], balls.radius[seen], colours)
         draw_ground_line(axes, self._walls, middle, limits[0], limits[1], limits[2])
         canvas.show(axes)
-        crest = crest_position(bench)
-        axes.plot([-bench.width, -bench.width, crest, 0.0], [0.0, bench.height, bench.height, 0.0],
-                  color=INK, lw=0.8, ls=(0, (4, 3)))  # fmt: skip
+        draw_bench_section(axes, bench, middle)
 
 
 @in_style

@@ -11,13 +11,14 @@ from matplotlib.collections import EllipseCollection, PatchCollection
 from matplotlib.patches import Patch, Rectangle
 from numpy.typing import NDArray
 
-from castblast.muckpile.bench import Bench, block_shape, crest_position
+from castblast.muckpile.bench import Bench, block_shape
 from castblast.muckpile.movement import block_levels, group_movement
 from castblast.muckpile.particles import Particles
 from castblast.report.ball_picture import PLAN_X, Canvas
+from castblast.report.bench_lines import draw_bench_section, draw_faces
 from castblast.report.blocks import WIDTH, shown_range
 from castblast.report.ground import INK, draw_ground, draw_ground_line
-from castblast.report.style import CYCLE, GREY, RED, in_style, new_figure, save_figure
+from castblast.report.style import CYCLE, GREY, in_style, new_figure, save_figure
 
 if TYPE_CHECKING:
     from castblast.muckpile.ore import Area, OreMovement, OrePolygon
@@ -63,7 +64,8 @@ def draw_movement(
     )
     blocks = group_movement(before, after, before.block, rows * columns)
     arrows = _draw_vectors(plan, blocks.start, blocks.displacement, blocks.spread, (0, 1))
-    _draw_block_lines(plan, bench)
+    _draw_block_lines(plan, bench, blocks.balls)
+    draw_faces(plan, bench)
     plan.set(title="Movement of the blocks, from above", ylabel="y [m], along the bench", ylim=y)
     figure.colorbar(
         arrows, ax=side, label="throw, horizontal [m]", location="bottom", aspect=40, shrink=0.8
@@ -73,9 +75,7 @@ def draw_movement(
     group = block_levels(before._replace(block=row), bench.height, LEVELS, rows)
     levels = group_movement(before, after, group, LEVELS * rows)
     _draw_vectors(side, levels.start, levels.displacement, levels.spread, (0, 2), arrows.norm)
-    crest = crest_position(bench)
-    side.plot([-bench.width, -bench.width, crest, 0.0], [0.0, bench.height, bench.height, 0.0],
-              color=INK, lw=1.0, ls=(0, (4, 3)))  # fmt: skip
+    draw_bench_section(side, bench, 0.5 * bench.length)
     draw_ground_line(side, walls, 0.5 * bench.length, *x, -0.05 * z_top)
     side.set(
         title=f"Rows in {LEVELS} levels of the bench, averaged along it",
@@ -117,18 +117,18 @@ def _draw_vectors(
     )  # fmt: skip
 
 
-def _draw_block_lines(axes: Any, bench: Bench) -> None:
+def _draw_block_lines(axes: Any, bench: Bench, balls: NDArray[np.int64]) -> None:
     rows, columns = block_shape(bench)
     burden, spacing = bench.burden, bench.spacing
     boxes = [
         Rectangle((-(row + 1) * burden, column * spacing), burden, spacing)
         for row in range(rows)
         for column in range(columns)
+        if balls[row * columns + column]
     ]
     axes.add_collection(
         PatchCollection(boxes, facecolor="none", edgecolor="#CCCCCC", linewidths=0.5)
     )
-    axes.axvline(0.0, color=RED, lw=1.0)
 
 
 @in_style
@@ -165,9 +165,7 @@ def draw_profiles(
     height = (WIDTH - 0.8) * top / (high - low) + 1.2
     figure, axes = new_figure(1, 1, width=WIDTH, height=max(height, 2.8))
     draw_ground(axes, ground, -0.05 * top)
-    crest = crest_position(bench)
-    axes.plot([-bench.width, -bench.width, crest, 0.0], [0.0, bench.height, bench.height, 0.0],
-              color=INK, lw=1.0, ls=(0, (4, 3)), label="bench before")  # fmt: skip
+    draw_bench_section(axes, bench, 0.5 * bench.length)
     if band is not None:
         mean, half = band
         axes.fill_between(mean.x, mean.height - half, mean.height + half, color=GREY, alpha=0.35,
@@ -217,7 +215,7 @@ def draw_ore(
         canvas = Canvas(PLAN_X, (*x, *y), 900)
         canvas.add(balls.position, balls.radius, _ore_colours(moved.polygon, colours))
         canvas.show(axis)
-        axis.axvline(0.0, color=RED, lw=1.0)
+        draw_faces(axis, bench)
         axis.set(title=title, xlabel="x [m], direction of throw", ylabel="y [m], along the bench")
     for k, (polygon, colour) in enumerate(zip(polygons, colours, strict=True)):
         _draw_area(axes[0, 0], [[polygon.corners]], INK, "-")

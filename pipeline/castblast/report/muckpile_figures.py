@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from castblast.muckpile.bench import Bench, crest_position
+from castblast.muckpile.bench import Bench
 from castblast.muckpile.particles import Particles
 from castblast.report.ball_picture import PLAN_X, PLAN_Y, SECTION, Canvas
+from castblast.report.bench_lines import draw_bench_section, draw_faces
 from castblast.report.blocks import (
     WIDTH,
     block_colours,
@@ -21,7 +22,7 @@ from castblast.report.blocks import (
     left_out_words,
     shown_range,
 )
-from castblast.report.ground import INK, draw_ground_line
+from castblast.report.ground import draw_ground_line
 from castblast.report.style import BLUE, GREEN, GREY, ORANGE, RED, in_style, new_figure, save_figure
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ def draw_section(
     figure, axes = _section_panels(2, limits)
     _draw_cut(axes[0], before, bench, walls, y, limits)
     _draw_cut(axes[1], after, bench, walls, y, limits)
-    _draw_outline(axes[1], bench)
+    draw_bench_section(axes[1], bench, y)
     axes[1].plot(mean_profile.x, mean_profile.height, color=RED, lw=1.4, label="mean surface")
     axes[0].set_title(f"Before, section at y = {y:.1f} m")
     axes[1].set_title("After" + left_out_words(after, x=limits[:2]))
@@ -96,7 +97,7 @@ def draw_sections(
     figure, axes = _section_panels(len(sections), limits)
     for panel, (y, profile) in zip(np.atleast_1d(axes), sections, strict=True):
         _draw_cut(panel, after, bench, walls, y, limits)
-        _draw_outline(panel, bench)
+        draw_bench_section(panel, bench, y)
         panel.plot(profile.x, profile.height, color=RED, lw=1.2, label="surface")
         panel.set_title(f"y = {y:.1f} m")
     block_legend(figure, np.atleast_1d(axes)[0], bench)
@@ -138,18 +139,6 @@ def _draw_cut(
     canvas.show(axes)
 
 
-def _draw_outline(axes: Any, bench: Bench) -> None:
-    crest = crest_position(bench)
-    axes.plot(
-        [-bench.width, -bench.width, crest, 0.0],
-        [0.0, bench.height, bench.height, 0.0],
-        color=INK,
-        lw=1.0,
-        ls=(0, (4, 3)),
-        label="bench before",
-    )
-
-
 @in_style
 def draw_plan(path: Path, before: Particles, after: Particles, bench: Bench) -> Path:
     """Draw bench and muckpile from above, each ball in the colour of its block.
@@ -175,7 +164,7 @@ def draw_plan(path: Path, before: Particles, after: Particles, bench: Bench) -> 
             canvas, shown = Canvas(PLAN_Y, (*y, -x[1], -x[0])), (*y, x[1], x[0])
         canvas.add(balls.position, balls.radius, colours)
         canvas.show(panel, shown)
-        _draw_face(panel, bench, beside=beside)
+        draw_faces(panel, bench, along_first=not beside)
     thrown, along = "x [m], direction of throw", "y [m], along the bench"
     for panel in axes:
         panel.set(xlabel=thrown if beside else along, ylabel=along if beside else thrown)
@@ -190,12 +179,6 @@ def _plan_height(across: float, *, beside: bool) -> float:
     inner = WIDTH - 0.8
     height = 0.5 * inner * across if beside else 2.0 * inner / across
     return min(max(height + 1.1, 3.0), 11.0)
-
-
-def _draw_face(axes: Any, bench: Bench, *, beside: bool) -> None:
-    face_x, face_y = [0.0, 0.0], [0.0, bench.length]
-    first, second = (face_x, face_y) if beside else (face_y, face_x)
-    axes.plot(first, second, color=RED, lw=1.2, label="toe of the face")
 
 
 @in_style
