@@ -120,9 +120,13 @@ def bench_volume(bench: Bench) -> float:
     return outline_volume(bench_outline(bench), bench.height)
 
 
+_LENGTHS = ("length", "width", "height", "burden", "spacing")
+
+
 def check_bench(bench: Bench) -> list[str]:
     """Return every fault of `bench` in words; an empty list means that it can be used."""
-    lengths = ("length", "width", "height", "burden", "spacing")
+    # Length and width of a polygon follow from its corners.
+    lengths = ("height", "burden", "spacing") if bench.corners else _LENGTHS
     faults = [
         f"{name} = {getattr(bench, name):g} m: must be positive"
         for name in lengths

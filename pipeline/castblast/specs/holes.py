@@ -131,7 +131,7 @@ def _value_faults(table: Table) -> list[str]:
         for line, value in zip(table.line, table.number[name], strict=True):
             try:
                 if np.isfinite(value):
-                    convert_variable(name, f"{value!r} {VARIABLES[name].unit}")
+                    convert_variable(name, f"{float(value)!r} {VARIABLES[name].unit}")
             except QuantityError as fault:
                 faults.append(f"{table.path}: line {line}: {name}: {fault}")
     return faults

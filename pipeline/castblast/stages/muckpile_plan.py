@@ -187,8 +187,8 @@ def _with_charge(design: dict[str, Any]) -> dict[str, Any]:
     mass = design.pop("charge_mass", None)
     if mass is None:
         return design
-    hole = design.get("hole_diameter", VARIABLES["hole_diameter"].default)
-    diameter: float = design.get("charge_diameter", hole)
+    default = VARIABLES["hole_diameter"].default or math.nan
+    diameter = design.get("charge_diameter") or design.get("hole_diameter") or default
     density = load_explosive(design["explosive"]).density
     design["charge_length"] = mass / (density * 0.25 * math.pi * diameter**2)
     design.pop("stemming_length", None)
