@@ -22,7 +22,7 @@ from castblast.muckpile.bench import Bench
 from castblast.muckpile.particles import Particles
 from castblast.report.ball_picture import SECTION, Canvas
 from castblast.report.bench_lines import draw_bench_section
-from castblast.report.blocks import block_colours, shown_range
+from castblast.report.blocks import block_colours, origin_blocks, shown_range
 from castblast.report.ground import draw_ground_line
 from castblast.report.muckpile_view import Scene
 from castblast.report.style import in_style, new_figure
@@ -71,6 +71,7 @@ class Animation:
 
     def __init__(self, folder: Path, start: Particles, bench: Bench, walls: Walls) -> None:
         self._start, self._bench, self._walls = start, bench, walls
+        self._colours = block_colours(origin_blocks(start, bench), bench)
         self._spool = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115 - lives as long as this
         self.times: list[float] = []
 
@@ -141,7 +142,7 @@ class Animation:
         for time, balls in zip(self.times, self._states(), strict=True):
             for axis in axes:
                 axis.clear()
-            scene.canvas(balls).show(axes[0])
+            scene.canvas(balls, self._colours).show(axes[0])
             self._draw_section(axes[1], balls, limits)
             _name_axes(axes, time)
             yield figure
@@ -156,8 +157,7 @@ class Animation:
         if not seen.any():
             seen = np.ones(len(behind), dtype=np.bool_)
         canvas = Canvas(SECTION, limits, round(_WIDTH * _DPI))
-        colours = block_colours(balls.block[seen], bench)
-        canvas.add(balls.position[seen], balls.radius[seen], colours)
+        canvas.add(balls.position[seen], balls.radius[seen], self._colours[seen])
         draw_ground_line(axes, self._walls, middle, limits[0], limits[1], limits[2])
         canvas.show(axes)
         draw_bench_section(axes, bench, middle)

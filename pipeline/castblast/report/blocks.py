@@ -1,7 +1,8 @@
 """Colours of blocks and what the pictures of a muckpile have in common.
 
-A ball keeps the colour of the block it came from: the hue tells the row, counted from the face;
-neighbouring columns differ in lightness. Balls without a block are grey.
+A ball keeps the colour of the place it came from, burden by spacing: the hue tells the row, counted
+from the face; neighbouring columns differ in lightness. So the colours are those of the blocks,
+and still tell rows where balls are fired by the nearest hole. Balls without a block are grey.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from matplotlib import colormaps
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from castblast.muckpile.bench import Bench, block_shape
+from castblast.muckpile.bench import Bench, assign_blocks, block_shape
 from castblast.muckpile.particles import Particles
 
 Colours = NDArray[np.float64]
@@ -22,6 +23,11 @@ WIDTH = 10.0
 _GREY = (0.62, 0.62, 0.62, 1.0)
 _MARGIN = 0.03
 _SHOWN = 0.997  # share of the balls that a picture has to hold; single far rollers stretch it
+
+
+def origin_blocks(before: Particles, bench: Bench) -> NDArray[np.int64]:
+    """Block of the grid (n,) that each ball lies in before the blast; -1: it is never fired."""
+    return np.where(before.block >= 0, assign_blocks(before.position, bench), -1)
 
 
 def block_colours(block: NDArray[np.int64], bench: Bench) -> Colours:

@@ -16,7 +16,7 @@ from castblast.muckpile.movement import block_levels, group_movement
 from castblast.muckpile.particles import Particles
 from castblast.report.ball_picture import PLAN_X, Canvas
 from castblast.report.bench_lines import draw_bench_section, draw_faces
-from castblast.report.blocks import WIDTH, shown_range
+from castblast.report.blocks import WIDTH, origin_blocks, shown_range
 from castblast.report.ground import INK, draw_ground, draw_ground_line
 from castblast.report.style import CYCLE, GREY, in_style, new_figure, save_figure
 
@@ -42,7 +42,8 @@ def draw_movement(
 ) -> Path:
     """Draw movement vectors: of each block in plan, of each row and level in section.
 
-    Vectors are to scale, from the centre of mass before to that after; an ellipse at the head has
+    A block is what fires as one: a cell of the grid, or the rock nearest to a hole. Vectors are to
+    scale, from the centre of mass before to that after; an ellipse at the head has
     half axes of one standard deviation of the displacements within the block.
 
     Parameters
@@ -62,16 +63,19 @@ def draw_movement(
     figure, (plan, side) = new_figure(
         2, 1, width=inner + 1.0, height=inner * sum(rises) + 2.2, sharex=True, height_ratios=rises
     )
-    blocks = group_movement(before, after, before.block, rows * columns)
+    origin = origin_blocks(before, bench)
+    count = max(rows * columns, int(before.block.max()) + 1)
+    blocks = group_movement(before, after, before.block, count)
     arrows = _draw_vectors(plan, blocks.start, blocks.displacement, blocks.spread, (0, 1))
-    _draw_block_lines(plan, bench, blocks.balls)
+    if (origin == before.block).all():
+        _draw_block_lines(plan, bench, blocks.balls)
     draw_faces(plan, bench)
     plan.set(title="Movement of the blocks, from above", ylabel="y [m], along the bench", ylim=y)
     figure.colorbar(
         arrows, ax=side, label="throw, horizontal [m]", location="bottom", aspect=40, shrink=0.8
     )
 
-    row = np.where(before.block >= 0, before.block // columns, -1)
+    row = np.where(origin >= 0, origin // columns, -1)
     group = block_levels(before._replace(block=row), bench.height, LEVELS, rows)
     levels = group_movement(before, after, group, LEVELS * rows)
     _draw_vectors(side, levels.start, levels.displacement, levels.spread, (0, 2), arrows.norm)
@@ -158,24 +162,27 @@ def draw_profiles(
     title : str
     """
     every = [*profiles.values(), *([band[0]] if band else [])]
-    low = min(-1.05 * bench.width, *(float(p.x[0]) for p in every))
-    high = max(float(p.x[p.height > 0.02 * p.height.max()].max(initial=0.0)) for p in every)
+    piles = [(p.x, p.height - np.interp(p.x, ground.x, ground.height)) for p in every]
+    seen = [x[height > 0.02 * height.max()] for x, height in piles]
+    low = min(-1.05 * bench.width, *(float(x.min(initial=0.0)) for x in seen))
+    high = max(float(x.max(initial=0.0)) for x in seen)
     high += 0.05 * (high - low)
     top = 1.1 * max(bench.height, *(float(p.height[p.x <= high].max()) for p in every))
-    height = (WIDTH - 0.8) * top / (high - low) + 1.2
+    height = (WIDTH - 0.8) * top / (high - low) + 1.4
     figure, axes = new_figure(1, 1, width=WIDTH, height=max(height, 2.8))
     draw_ground(axes, ground, -0.05 * top)
     draw_bench_section(axes, bench, 0.5 * bench.length)
     if band is not None:
         mean, half = band
-        axes.fill_between(mean.x, mean.height - half, mean.height + half, color=GREY, alpha=0.35,
-                          lw=0.0, label=band_words, zorder=2)  # fmt: skip
+        lower = np.maximum(mean.height - half, np.interp(mean.x, ground.x, ground.height))
+        axes.fill_between(mean.x, lower, mean.height + half, color=GREY, alpha=0.35, lw=0.0,
+                          label=band_words, zorder=2)  # fmt: skip
         axes.plot(mean.x, mean.height, color=INK, lw=1.8, label="mean", zorder=4)
     for (name, profile), colour in zip(profiles.items(), _cycle(len(profiles)), strict=True):
         axes.plot(profile.x, profile.height, color=colour, lw=1.1, label=name, zorder=3)
     axes.set(title=title, xlabel="x [m], in front of the toe of the face", ylabel="z [m]",
              xlim=(low, high), ylim=(-0.05 * top, top), aspect="equal")  # fmt: skip
-    axes.legend(loc="upper right", ncols=2)
+    figure.legend(loc="outside lower center", ncols=4)
     return save_figure(figure, path, dpi=160)
 
 

@@ -17,9 +17,11 @@ from castblast.report.ball_picture import PLAN_X, PLAN_Y, SECTION, Canvas
 from castblast.report.bench_lines import draw_bench_section, draw_faces
 from castblast.report.blocks import (
     WIDTH,
+    Colours,
     block_colours,
     block_legend,
     left_out_words,
+    origin_blocks,
     shown_range,
 )
 from castblast.report.ground import draw_ground_line
@@ -61,8 +63,9 @@ def draw_section(
     """
     limits = _section_limits(before, after, bench)
     figure, axes = _section_panels(2, limits)
-    _draw_cut(axes[0], before, bench, walls, y, limits)
-    _draw_cut(axes[1], after, bench, walls, y, limits)
+    colours = block_colours(origin_blocks(before, bench), bench)
+    _draw_cut(axes[0], before, colours, bench, walls, y, limits)
+    _draw_cut(axes[1], after, colours, bench, walls, y, limits)
     draw_bench_section(axes[1], bench, y)
     axes[1].plot(mean_profile.x, mean_profile.height, color=RED, lw=1.4, label="mean surface")
     axes[0].set_title(f"Before, section at y = {y:.1f} m")
@@ -95,8 +98,9 @@ def draw_sections(
     """
     limits = _section_limits(before, after, bench)
     figure, axes = _section_panels(len(sections), limits)
+    colours = block_colours(origin_blocks(before, bench), bench)
     for panel, (y, profile) in zip(np.atleast_1d(axes), sections, strict=True):
-        _draw_cut(panel, after, bench, walls, y, limits)
+        _draw_cut(panel, after, colours, bench, walls, y, limits)
         draw_bench_section(panel, bench, y)
         panel.plot(profile.x, profile.height, color=RED, lw=1.2, label="surface")
         panel.set_title(f"y = {y:.1f} m")
@@ -125,6 +129,7 @@ def _section_panels(count: int, limits: _Limits) -> tuple[Any, Any]:
 def _draw_cut(
     axes: Any,
     balls: Particles,
+    colours: Colours,
     bench: Bench,
     walls: Walls,
     y: float,
@@ -135,7 +140,7 @@ def _draw_cut(
     seen = (behind >= -balls.radius.mean()) & (behind < bench.spacing)
     draw_ground_line(axes, walls, y, limits[0], limits[1], limits[2])
     canvas = Canvas(SECTION, limits)
-    canvas.add(balls.position[seen], balls.radius[seen], block_colours(balls.block[seen], bench))
+    canvas.add(balls.position[seen], balls.radius[seen], colours[seen])
     canvas.show(axes)
 
 
@@ -156,8 +161,8 @@ def draw_plan(path: Path, before: Particles, after: Particles, bench: Bench) -> 
     rows, columns = (2, 1) if not beside else (1, 2)
     height = _plan_height(across, beside=beside)
     figure, axes = new_figure(rows, columns, width=WIDTH, height=height, sharex=True, sharey=True)
+    colours = block_colours(origin_blocks(before, bench), bench)
     for panel, balls in zip(axes, (before, after), strict=True):
-        colours = block_colours(balls.block, bench)
         if beside:
             canvas, shown = Canvas(PLAN_X, (*x, *y)), (*x, *y)
         else:

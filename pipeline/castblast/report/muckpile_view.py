@@ -10,7 +10,14 @@ import numpy as np
 from castblast.muckpile.bench import Bench
 from castblast.muckpile.particles import Particles
 from castblast.report.ball_picture import Canvas, oblique
-from castblast.report.blocks import WIDTH, block_colours, block_legend, shown_range
+from castblast.report.blocks import (
+    WIDTH,
+    Colours,
+    block_colours,
+    block_legend,
+    origin_blocks,
+    shown_range,
+)
 from castblast.report.ground import INK, ground_points
 from castblast.report.style import in_style, new_figure, save_figure
 
@@ -33,12 +40,13 @@ def draw_view(path: Path, before: Particles, after: Particles, bench: Bench, wal
     walls : Walls
         Ground.
     """
+    colours = block_colours(origin_blocks(before, bench), bench)
     scene = Scene(shown_range(before, after, 0), shown_range(before, after, 1), bench, walls)
     left, right, bottom, top = scene.extent
     height = 2.0 * WIDTH * (top - bottom) / (right - left) + 0.9
     figure, axes = new_figure(2, 1, width=WIDTH, height=min(height, 14.0))
     for panel, balls, title in ((axes[0], before, "Before"), (axes[1], after, "After")):
-        scene.canvas(balls).show(panel)
+        scene.canvas(balls, colours).show(panel)
         panel.set_title(title)
         panel.set_axis_off()
     _draw_scale(axes[0], scene.extent)
@@ -67,7 +75,7 @@ class Scene:
         walls: Walls,
         pixels: int = 1600,
     ) -> None:
-        self.bench, self.pixels = bench, pixels
+        self.pixels = pixels
         self.view = oblique(_VIEW_AZIMUTH, _VIEW_ELEVATION)
         corners = np.array([[a, b, c] for a in x for b in y for c in (0.0, 1.05 * bench.height)])
         seen = self.view.project(corners)
@@ -80,13 +88,13 @@ class Scene:
         self._spacing = 1.5 * (self.extent[1] - self.extent[0]) / pixels
         self._ground = ground_points(walls, x, y, self._spacing)
 
-    def canvas(self, balls: Particles) -> Canvas:
-        """Paint ground and balls."""
+    def canvas(self, balls: Particles, colours: Colours) -> Canvas:
+        """Paint ground and balls, in `colours` (n, 3 or 4)."""
         canvas = Canvas(self.view, self.extent, self.pixels)
-        place, colours = self._ground
+        place, tones = self._ground
         radius = 0.9 * self._spacing
-        canvas.add(place, np.full(len(place), radius), colours, flat=True)
-        canvas.add(balls.position, balls.radius, block_colours(balls.block, self.bench))
+        canvas.add(place, np.full(len(place), radius), tones, flat=True)
+        canvas.add(balls.position, balls.radius, colours)
         return canvas
 
 

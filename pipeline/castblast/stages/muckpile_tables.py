@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from castblast.muckpile.bench import Bench, block_shape
+from castblast.muckpile.bench import Bench, assign_blocks, block_shape
 from castblast.muckpile.case import CastCase, CastHistory
 from castblast.muckpile.movement import group_movement
 from castblast.muckpile.particles import FloatArray, Particles
@@ -93,10 +93,11 @@ def block_columns(case: CastCase, after: Particles, bench: Bench) -> dict[str, A
     _, columns = block_shape(bench)
     moved = group_movement(case.particles, after, case.particles.block, len(case.block_delay))
     block = np.flatnonzero(moved.balls)
+    cell = assign_blocks(moved.start[block], bench)
     table: dict[str, Any] = {
         "block": block,
-        "row": block // columns,
-        "column": block % columns,
+        "row": cell // columns,
+        "column": cell % columns,
         "delay [s]": case.block_delay[block],
         "speed [m/s]": np.linalg.norm(case.block_velocity[block], axis=1),
         "balls": moved.balls[block],
