@@ -12,6 +12,8 @@ import yaml
 
 from castblast.errors import SpecError
 from castblast.stages.muckpile import run_muckpile
+from castblast.stages.muckpile_compare import run_seeds
+from castblast.stages.muckpile_extras import Extras
 
 SMALL: dict[str, Any] = {
     "name": "small",
@@ -93,6 +95,43 @@ def test_a_second_run_reuses_the_packing_and_repeats_every_file(
     assert {name for name in FILES if (out / name).read_bytes() != before[name]} == set()
 
 
+def test_ore_and_frames(run: tuple[Path, Path, dict[str, Any]], tmp_path: Path) -> None:
+    """Ore loses at least nothing and at most all; frames do not change the numbers."""
+    _, out, plain = run
+    corners = [[-4, 0], [-2, 0], [-2, 4], [-4, 4]]
+    polygons = [{"name": "rear", "grade": 3.0, "corners": corners}]
+    (tmp_path / "ore.yaml").write_text(yaml.safe_dump({"polygons": polygons}))
+    bench = written(tmp_path, SMALL | {"ore": "ore.yaml"})
+    extras = Extras(dig_block="1 m", animation="gif", frame_interval="0.2 s")
+    outcome = run_muckpile(bench, tmp_path, threads=1, packings=out / "packings", extras=extras)
+    assert outcome.document["packing_reused"]
+    assert outcome.document["throw"] == plain["throw"]
+    ore = outcome.document["ore"]
+    assert ore["dig_block"] == 1.0
+    # The rear half of the bench is thrown less far than the whole.
+    assert 0.0 < ore["polygons"][0]["displacement"][0] < plain["throw"][0]
+    assert ore["polygons"][0]["balls"] == pytest.approx(125, abs=15)
+    for result in ore["digging"]:
+        assert 0.0 <= result["loss"] <= 1.0
+        assert 0.0 <= result["dilution"] <= 1.0
+        assert result["grade"] == pytest.approx(3.0 * (1.0 - result["dilution"]))
+    by_method = {result["method"]: result["loss"] for result in ore["digging"]}
+    assert by_method["dig_blocks"] < by_method["as_planned"]
+    names = {path.name for path in outcome.files}
+    assert {"ore.png", "animation.gif"} <= names
+    assert "rear: ore loss, dug in blocks" in {row[0] for row in outcome.rows}
+
+
+def test_bands_over_seeds(tmp_path: Path) -> None:
+    bench = written(tmp_path, SMALL)
+    outcome = run_seeds(bench, tmp_path / "out", 2, threads=1)
+    found = [json.loads((tmp_path / f"out/seed_{k}/metrics.json").read_text()) for k in (0, 1)]
+    assert found[0]["throw"] != found[1]["throw"]
+    mean = 0.5 * (found[0]["runout_95"] + found[1]["runout_95"])
+    assert outcome.document["bands"]["runout_95"]["mean"] == pytest.approx(mean)
+    assert (tmp_path / "out" / "profiles.png").is_file()
+
+
 def test_a_file_of_balls(run: tuple[Path, Path, dict[str, Any]], tmp_path: Path) -> None:
     """Balls that collapse from a column under their own weight, without being fired."""
     _, out, _ = run
@@ -115,6 +154,10 @@ def test_a_file_of_balls(run: tuple[Path, Path, dict[str, Any]], tmp_path: Path)
     ("options", "line"),
     [
         ({"velocity": "12.7"}, "--velocity: 12.7: no unit given"),
+        ({"extras": Extras(dig_block="3")}, "--dig-block: 3: no unit given"),
+        ({"extras": Extras(frame_interval="0 s")}, "--frame-interval: 0 s: must be larger than 0"),
+        ({"extras": Extras(animation="avi")}, "--animation: avi: unknown format"),
+        ({"extras": Extras(ore=Path("none.csv"))}, "none.csv: no such file"),
         ({"velocity": "200 m/s"}, "--velocity: 200 m/s: implausible"),
         ({"balls": 10}, "must fit at least twice into the shortest side of the bench, 3 m"),
     ],

@@ -2,13 +2,16 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from castblast.cli.options import OutFolder
 from castblast.cli.screen import Screen
 from castblast.cli.verb import verb
+
+if TYPE_CHECKING:
+    from castblast.stages.muckpile_results import MuckpileOutcome
 
 
 def muckpile(
@@ -39,20 +42,69 @@ def muckpile(
             show_default=False,
         ),
     ] = None,
+    seeds: Annotated[
+        int, typer.Option(min=1, help="Runs with so many seeds; bands over them.")
+    ] = 1,
+    ore: Annotated[
+        Path | None,
+        typer.Option(
+            help="Ore polygons (YAML or CSV): ore loss, dilution and where the ore lies.",
+            show_default=False,
+        ),
+    ] = None,
+    dig_block: Annotated[
+        str | None,
+        typer.Option(help='Side of a dig block, "3 m"; default: spacing.', show_default=False),
+    ] = None,
+    flitch: Annotated[
+        str | None,
+        typer.Option(
+            help='Height of a dig block, "2.5 m"; default: the whole pile.', show_default=False
+        ),
+    ] = None,
+    animation: Annotated[
+        str | None, typer.Option(metavar="gif|mp4", help="Write an animation.", show_default=False)
+    ] = None,
+    vtk: Annotated[bool, typer.Option("--vtk", help="Write .vtp frames and a .pvd.")] = False,
+    vtkhdf: Annotated[
+        bool, typer.Option("--vtkhdf", help="Write all frames to a .vtkhdf.")
+    ] = False,
+    frame_interval: Annotated[
+        str, typer.Option(help="Simulated time between two frames.")
+    ] = "0.1 s",
 ) -> Mapping[str, Any]:
     """Pack, fire and settle a bench; writes final state, profile, pictures and metrics."""
     from castblast.stages.muckpile import run_muckpile
+    from castblast.stages.muckpile_compare import run_seeds
+    from castblast.stages.muckpile_extras import Extras
 
+    options: dict[str, Any] = {
+        "balls": balls,
+        "threads": threads,
+        "velocity": velocity,
+        "packings": packings,
+        "extras": Extras(ore, dig_block, flitch, animation, vtk, vtkhdf, frame_interval),
+    }
     with screen.progress("muckpile") as progress:
-        outcome = run_muckpile(
-            bench,
-            out,
-            balls=balls,
-            threads=threads,
-            velocity=velocity,
-            packings=packings,
-            progress=progress,
-        )
+        if seeds > 1:
+            outcome = run_seeds(bench, out, seeds, progress=progress, **options)
+        else:
+            outcome = run_muckpile(bench, out, progress=progress, **options)
+    return _show(screen, outcome)
+
+
+def compare_muckpiles(
+    screen: Screen,
+    folders: Annotated[list[Path], typer.Argument(help="Folders of finished muckpile runs.")],
+    out: OutFolder = None,
+) -> Mapping[str, Any]:
+    """Compare finished muckpiles: mean and scatter of every metric, profiles over each other."""
+    from castblast.stages.muckpile_compare import compare_runs
+
+    return _show(screen, compare_runs(folders, Path() if out is None else out))
+
+
+def _show(screen: Screen, outcome: "MuckpileOutcome") -> Mapping[str, Any]:
     screen.table(("quantity", "value", "unit"), outcome.rows, title=outcome.title)
     for path in outcome.files:
         screen.say(f"wrote {path}")
@@ -60,5 +112,6 @@ def muckpile(
 
 
 def add_to(app: typer.Typer) -> None:
-    """Register the verb."""
+    """Register the verbs."""
     verb(app)(muckpile)
+    verb(app)(compare_muckpiles)

@@ -236,6 +236,8 @@ class BenchSpec(Spec):
     slope : SlopeSpec, optional
     stop : StopRule
     numerics : Numerics
+    ore : str, optional
+        File of ore polygons, relative to the bench file.
     seed : int
     notes : str
     """
@@ -251,6 +253,7 @@ class BenchSpec(Spec):
     slope: SlopeSpec | None = None
     stop: StopRule = StopRule()
     numerics: Numerics = Numerics()
+    ore: Annotated[str, Field(min_length=1)] | None = None
     seed: Annotated[int, Field(ge=0)] = 0
     notes: str = ""
 

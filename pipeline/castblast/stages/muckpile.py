@@ -15,13 +15,16 @@ from castblast.muckpile.initial_state import wall_faults
 from castblast.muckpile.metrics import pile_metrics
 from castblast.muckpile.particles import Particles
 from castblast.muckpile.simulation import Simulation
-from castblast.muckpile.solver import CastCase, run_cast
+from castblast.muckpile.solver import CastCase, CastResult, run_cast
 from castblast.muckpile.threads import thread_count
 from castblast.muckpile.walls import Walls, bench_walls, join, slope
 from castblast.progress import ProgressCallback, silent
 from castblast.specs.balls import ChosenSizes
 from castblast.specs.bench import BenchSpec, find_bench, load_bench
 from castblast.specs.quantity import parse_quantity
+from castblast.stages.muckpile_extras import Extras, read_extras
+from castblast.stages.muckpile_frames import Frames
+from castblast.stages.muckpile_ore import follow_ore
 from castblast.stages.muckpile_plan import Plan, make_plan
 from castblast.stages.muckpile_results import MuckpileOutcome, describe_run, write_results
 from castblast.stages.muckpile_start import make_start
@@ -40,7 +43,9 @@ def run_muckpile(
     balls: int | None = None,
     threads: int | None = None,
     velocity: str | float | None = None,
+    seed: int | None = None,
     packings: Path | None = None,
+    extras: Extras = Extras(),  # noqa: B008 - a record of constants
     progress: ProgressCallback = silent,
 ) -> MuckpileOutcome:
     """Run a bench file.
@@ -57,23 +62,30 @@ def run_muckpile(
         Default: all cores. The numbers do not depend on it.
     velocity : str or float [m s-1], optional
         Instead of that of the file; a text carries its unit.
+    seed : int, optional
+        Instead of that of the file.
     packings : path, optional
         Folder of packings, named by the hash of their content: one that is there is used again,
         whatever run made it. Default: ``packings`` in `out`.
+    extras : Extras
+        Ore, animation, files for ParaView.
     progress : callback
 
     Raises
     ------
     SpecError
-        Faults of the bench file, or of a file of balls or holes; a wall that cuts the balls, a
-        step above the stable one, too little memory. Nothing has been simulated then, and a
-        packing that was made is kept.
+        Faults of the bench file, of a file of balls, holes or ore, or of an extra; a wall that
+        cuts the balls, a step above the stable one, too little memory. Nothing has been simulated
+        then, and a packing that was made is kept.
     SimulationError
         The simulation became unstable.
     """
     path = find_bench(bench)
     spec = _with_options(load_bench(path), balls, velocity)
+    if seed is not None:
+        spec = spec.model_copy(update={"seed": seed})
     geometry = spec.bench.to_bench()
+    wanted = read_extras(extras, geometry, path.parent / spec.ore if spec.ore else None)
     plan = make_plan(spec, geometry, path.parent, one_speed=velocity is not None)
     folder = Path("runs") / spec.name if out is None else out
     threads = threads or 0
@@ -89,13 +101,9 @@ def run_muckpile(
     folder.mkdir(parents=True, exist_ok=True)
     case = _case(spec, geometry, start.balls, plan, threads)
     _require_possible(spec, case)
-    result = run_cast(case, _part(progress, _PACKING_SHARE, _CAST_SHARE))
-    if Status(result.status) is Status.UNSTABLE_STEP:
-        message = (
-            f"{spec.name}: the simulation became unstable at {result.failed_time:.3g} s "
-            f"(ball {result.failed_ball})"
-        )
-        raise SimulationError(message)
+    result, frames = _simulate(
+        spec, case, folder, extras, wanted.interval, _part(progress, _PACKING_SHARE, _CAST_SHARE)
+    )
     progress(_CAST_SHARE, "writing files and pictures")
     metrics = pile_metrics(
         start.balls,
@@ -104,11 +112,45 @@ def run_muckpile(
         block_velocity=case.block_velocity,
         walls=case.walls,
     )
-    outcome = describe_run(spec, plan.speed, plan.prediction, start, result, metrics)
+    ore = follow_ore(wanted.ore, wanted.plan, case, result)
+    outcome = describe_run(spec, plan.speed, plan.prediction, start, result, metrics, ore)
     outcome = replace(outcome, document=outcome.document | {"fragments": _describe_sizes(sizes)})
-    files = write_results(folder, spec, case, result, outcome.document)
+    files = write_results(folder, spec, case, result, outcome.document, ore) + frames
     progress(1.0, f"{result.time:.1f} s simulated")
     return MuckpileOutcome(outcome.document, outcome.title, outcome.rows, files)
+
+
+def _simulate(
+    spec: BenchSpec,
+    case: CastCase,
+    folder: Path,
+    extras: Extras,
+    interval: float,
+    progress: ProgressCallback,
+) -> tuple[CastResult, list[Path]]:
+    """Throw the bench; frames along the way are written even if it fails."""
+    frames, files = None, []
+    if extras.frames:
+        case = case._replace(snapshot_interval=interval)
+        frames = Frames(
+            folder,
+            case,
+            spec.bench.to_bench(),
+            animation=extras.animation,
+            vtk=extras.vtk,
+            vtkhdf=extras.vtkhdf,
+        )
+    result = run_cast(case, progress, frames)
+    if frames is not None:
+        progress(1.0, "writing frames")
+        files = frames.close()
+    if Status(result.status) is Status.UNSTABLE_STEP:
+        message = (
+            f"{spec.name}: the simulation became unstable at {result.failed_time:.3g} s "
+            f"(ball {result.failed_ball})"
+        )
+        raise SimulationError(message)
+    return result, files
 
 
 def _with_options(spec: BenchSpec, balls: int | None, velocity: str | float | None) -> BenchSpec:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from castblast.files import write_text
 from castblast.muckpile.bench import Bench
 from castblast.muckpile.metrics import UNITS, Band, band
 from castblast.muckpile.profile import Profile
+from castblast.progress import ProgressCallback, silent
 from castblast.stages.muckpile_results import MuckpileOutcome, finite
 from castblast.stages.muckpile_tables import GROUND_COLUMN, MEAN_COLUMN, X_COLUMN
 
@@ -70,6 +72,43 @@ def compare_runs(folders: Sequence[Path], out: Path) -> MuckpileOutcome:
     ]
     title = f"{len(folders)} runs: mean and standard deviation"
     return MuckpileOutcome(document, title, band_rows(bands), files)
+
+
+def run_seeds(
+    bench: str | Path,
+    out: Path | None,
+    seeds: int,
+    *,
+    progress: ProgressCallback = silent,
+    **options: Any,
+) -> MuckpileOutcome:
+    """Run a bench with several seeds, from that of its file on, and compare the runs.
+
+    Parameters
+    ----------
+    bench, out, options
+        As `run_muckpile` takes them; the runs are written to ``seed_K`` in `out`.
+    seeds : int
+        At least 2.
+    progress : callback
+    """
+    from castblast.specs.bench import load_bench
+    from castblast.stages.muckpile import run_muckpile
+
+    spec = load_bench(bench)
+    folder = Path("runs") / spec.name if out is None else out
+    first = options.pop("seed", None)
+    first = spec.seed if first is None else first
+    folders, files = [], []
+    for k in range(seeds):
+        folders.append(folder / f"seed_{first + k}")
+
+        def report(share: float, line: str, k: int = k) -> None:
+            progress((k + share) / seeds, f"seed {first + k}: {line}")
+
+        files += run_muckpile(bench, folders[-1], seed=first + k, progress=report, **options).files
+    compared = compare_runs(folders, folder)
+    return replace(compared, files=files + compared.files)
 
 
 def metric_bands_of(documents: Sequence[Mapping[str, Any]]) -> dict[str, Band]:

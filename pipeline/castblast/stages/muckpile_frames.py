@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from castblast.muckpile.bench import Bench
 from castblast.muckpile.case import CastCase
 from castblast.muckpile.particles import Particles
-from castblast.progress import ProgressCallback, silent
 
 if TYPE_CHECKING:
     from castblast.report.animation import Animation
@@ -94,12 +93,11 @@ class Frames:
         if self._series is not None and (not self._series.times or time > self._series.times[-1]):
             self._series.add(time, balls)
 
-    def close(self, progress: ProgressCallback = silent) -> list[Path]:
+    def close(self) -> list[Path]:
         """Write what is still open; return the files that matter to people."""
         files: list[Path] = []
         try:
             if self._series is not None and self._series.times:
-                progress(0.0, "ParaView files")
                 if self._vtk:
                     files.append(self._series.close())
                 if self._vtkhdf:
@@ -110,6 +108,5 @@ class Frames:
             if self._scratch is not None:
                 shutil.rmtree(self._scratch, ignore_errors=True)
         if self._film is not None and self._film.times:
-            progress(0.5, "animation")
             files.append(self._film.write(self._folder / f"animation.{self._format}"))
         return files
