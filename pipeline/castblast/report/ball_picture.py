@@ -77,7 +77,7 @@ class Canvas:
         rows = max(1, round(pixels * (top - bottom) / (right - left)))
         shape = (_FINER * rows, _FINER * pixels)
         self._depth = np.full(shape, -np.inf)
-        self._colour = np.zeros((*shape, 3), dtype=np.float64)
+        self._colour = np.zeros((*shape, 3), dtype=np.float32)
 
     def add(self, position: Floats, radius: Floats, colours: Floats, *, flat: bool = False) -> None:
         """Paint balls.
@@ -106,12 +106,9 @@ class Canvas:
     def image(self) -> NDArray[np.uint8]:
         """Picture (rows, columns, 4), first row at the bottom; transparent where nothing is."""
         rows, columns = (size // _FINER for size in self._depth.shape)
-        squares = (rows, _FINER, columns, _FINER)
-        cover = np.isfinite(self._depth)
-        share = cover.reshape(squares).mean(axis=(1, 3))
-        colour = (self._colour * cover[:, :, None]).reshape(*squares, 3).mean(axis=(1, 3))
-        colour /= np.where(share > 0.0, share, 1.0)[:, :, None]
-        return np.asarray(np.rint(255.0 * np.dstack([colour, share])), dtype=np.uint8)
+        image = np.zeros((rows, columns, 4), dtype=np.uint8)
+        _shrink(self._depth, self._colour, _FINER, image)
+        return image
 
     def show(self, axes: Any, extent: tuple[float, float, float, float] | None = None) -> None:
         """Put the picture into matplotlib axes and give them its limits, to scale.
@@ -133,7 +130,7 @@ def _paint(
     ambient: float,
     light: Floats,
     depth: Floats,
-    picture: Floats,
+    picture: NDArray[np.float32],
 ) -> None:
     """Paint balls at `place` (n, 3), from the lower left corner, into depth and picture.
 
@@ -160,3 +157,27 @@ def _paint(
                 shade = ambient + (1.0 - ambient) * max(lit, 0.0)
                 for c in range(3):
                     picture[j, i, c] = min(shade * colour[n, c], 1.0)
+
+
+@kernel
+def _shrink(
+    depth: Floats, picture: NDArray[np.float32], finer: int, image: NDArray[np.uint8]
+) -> None:
+    """Average squares of `finer` pixels a side into colour and cover."""
+    rows, columns, _ = image.shape
+    for j in range(rows):
+        for i in range(columns):
+            covered = 0
+            red, green, blue = 0.0, 0.0, 0.0
+            for n in range(j * finer, (j + 1) * finer):
+                for m in range(i * finer, (i + 1) * finer):
+                    if depth[n, m] > -np.inf:
+                        covered += 1
+                        red += picture[n, m, 0]
+                        green += picture[n, m, 1]
+                        blue += picture[n, m, 2]
+            if covered:
+                image[j, i, 0] = np.uint8(255.0 * red / covered + 0.5)
+                image[j, i, 1] = np.uint8(255.0 * green / covered + 0.5)
+                image[j, i, 2] = np.uint8(255.0 * blue / covered + 0.5)
+                image[j, i, 3] = np.uint8(255.0 * covered / (finer * finer) + 0.5)

@@ -164,7 +164,7 @@ def draw_plan(path: Path, before: Particles, after: Particles, bench: Bench) -> 
     colours = block_colours(origin_blocks(before, bench), bench)
     for panel, balls in zip(axes, (before, after), strict=True):
         if beside:
-            canvas, shown = Canvas(PLAN_X, (*x, *y)), (*x, *y)
+            canvas, shown = Canvas(PLAN_X, (*x, *y), 850), (*x, *y)
         else:
             canvas, shown = Canvas(PLAN_Y, (*y, -x[1], -x[0])), (*y, x[1], x[0])
         canvas.add(balls.position, balls.radius, colours)
