@@ -193,15 +193,25 @@ def parts_for_memory(sizes: Sizes, samples: int, memory: float) -> int:
     return ceil(samples * sizes.row_memory / (memory - sizes.memory))
 
 
+def even_parts(parts: int, workers: int) -> int:
+    """Least number, `parts` or more, that the workers can be shared among without a rest.
+
+    A divisor of the workers, or else a multiple of them, of which as many as there are workers
+    take their turn at a time.
+    """
+    divisors = (p for p in range(parts, workers + 1) if workers % p == 0)
+    return next(divisors, ceil(parts / workers) * workers)
+
+
 def plan(
     costs: Costs, sizes: Sizes, means: Means, samples: int, workers: int, parts: int = 0
 ) -> Plan:
-    """Recommend shards and, where `parts` is 0, the fewest parts that fit into memory.
+    """Recommend shards and, where `parts` is 0, the fewest even parts that fit into memory.
 
     Parts share workers and disk evenly and run side by side; when there are fewer workers than
     parts, several parts take turns on one worker.
     """
-    parts = parts or parts_for_memory(sizes, samples, means.memory)
+    parts = parts or even_parts(parts_for_memory(sizes, samples, means.memory), workers)
     together = min(parts, workers)
     rows, each = ceil(samples / parts), workers // together
     rate = means.disk_rate / together

@@ -19,6 +19,7 @@ from scaling_law import (
     Sizes,
     best_shard_size,
     core_hours,
+    even_parts,
     parts_for_memory,
     plan,
     predict,
@@ -134,6 +135,21 @@ def test_parts_fill_the_memory(samples, parts):
 def test_coordinator_without_room_is_refused():
     with pytest.raises(ValueError, match="cannot start"):
         parts_for_memory(sizes, 10, 1e3)
+
+
+@given(parts=st.integers(1, 100), workers=worker_counts)
+def test_even_parts_leave_no_worker_idle(parts, workers):
+    """Whole workers for every part, or whole rounds of parts; never fewer than asked for."""
+    even = even_parts(parts, workers)
+    assert even >= parts
+    assert workers % even == 0 if even <= workers else even % workers == 0
+    assert even < parts + workers
+
+
+@given(costs=some_costs, n=st.integers(1, 10**5), workers=worker_counts)
+def test_core_hours_are_never_less_than_the_physics(costs, n, workers):
+    made = plan(costs, sizes, Means(memory=1e3 + 1e5), n, workers)
+    assert made.core_hours * 3600.0 >= n * costs.sample * (1.0 - 1e-12)
 
 
 def test_parts_take_turns_on_too_few_workers():
