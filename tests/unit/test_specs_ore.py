@@ -83,13 +83,14 @@ def test_faults_of_yaml(tmp_path: Path, text: str, line: str) -> None:
 @pytest.mark.parametrize(
     ("text", "line"),
     [
-        ("nam,x,y\na,1,2", "name: column is missing, did you mean 'nam'?"),
-        ("name,x,y,z\na,1,2,3", "z: unknown column"),
-        ("name,x,y\na,-1,two", "line 2: y: 'two' is not a number"),
-        ("name,x,y\na,-1", "line 2: y: '' is not a number"),
+        ("nam,x,y\na,1,2", "column 'nam': unknown column, did you mean 'name'?"),
+        ("x,y\n1,2", "the column 'name' is missing"),
+        ("name,x,y\na,-1,two", "line 2: y: two: a number is needed"),
+        ("name,x,y\na,-1,", "line 2: y: empty: a number is needed"),
+        ("name,x,y\na,-1", "line 2: 2 cells for 3 heads"),
         ("name,x,y,grade\na,-1,0,1\na,-2,0,2\na,-2,1,1", "line 3: grade: 'a' has another grade"),
-        ("name,x,y\n", "polygons"),
-        ("", "name: column is missing"),
+        ("name,x,y\n", "holds heads only"),
+        ("", "is empty"),
     ],
 )
 def test_faults_of_csv(tmp_path: Path, text: str, line: str) -> None:

@@ -33,6 +33,7 @@ FILES = (
     "profiles.png",
     "section.png",
     "sections.png",
+    "surface.npz",
     "view.png",
 )
 

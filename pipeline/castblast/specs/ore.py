@@ -6,8 +6,6 @@ free face at 0 (so the bench has negative x), y along the bench.
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections import Counter
 from pathlib import Path
@@ -16,12 +14,14 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from castblast.errors import SpecError, nearest_name
+from castblast.errors import SpecError
 from castblast.muckpile.bench import Bench
 from castblast.muckpile.ore import OrePolygon
-from castblast.specs.loading import Spec, load_spec, make_spec, read_text
+from castblast.specs.loading import Spec, load_spec, make_spec
+from castblast.specs.table import read_table
 
-_COLUMNS = ("name", "x", "y")
+#: Grades are numbers in whatever unit the user thinks in.
+_COLUMNS = {"x": "m", "y": "m", "grade": "1"}
 # Polygons drawn side by side share corners that were rounded to a centimetre.
 _OVERLAP = 0.01
 
@@ -47,7 +47,8 @@ def read_ore(path: Path, bench: Bench | None = None) -> tuple[OrePolygon, ...]:
     """Read ore polygons from YAML, or from CSV by its suffix.
 
     YAML holds ``polygons``, a list of ``name``, ``corners`` ([x, y] pairs) and optionally
-    ``grade``; CSV has the columns name, x, y and optionally grade, a line per corner.
+    ``grade``; CSV has the columns name, x, y (in m, or with a unit: ``x [ft]``) and optionally
+    grade, a line per corner.
 
     Parameters
     ----------
@@ -84,45 +85,23 @@ def _without_closing_corner(corners: Any) -> Any:
 
 def _from_csv(path: Path) -> dict[str, Any]:
     """Gather the lines of each name, in order of appearance."""
-    reader = csv.DictReader(io.StringIO(read_text(path)), skipinitialspace=True)
-    header = [name.strip().lower() for name in reader.fieldnames or []]
-    reader.fieldnames = header
-    faults = [
-        f"{path}: {name}: column is missing{nearest_name(name, header)}"
-        for name in _COLUMNS
-        if name not in header
-    ]
-    faults += [
-        f"{path}: {name}: unknown column{nearest_name(name, (*_COLUMNS, 'grade'))}"
-        for name in header
-        if name not in (*_COLUMNS, "grade")
-    ]
-    if faults:
-        raise SpecError("\n".join(faults))
+    table = read_table(path, _COLUMNS, ("name", "x", "y"), ("name",), bare=True)
+    grades = table.number.get("grade", np.full(len(table.line), math.nan))
     found: dict[str, dict[str, Any]] = {}
-    for line, row in enumerate(reader, start=2):
-        name = (row["name"] or "").strip()
-        values = [_number(row.get(key), f"{path}: line {line}: {key}", faults) for key in "xy"]
+    faults = []
+    for k, name in enumerate(table.text["name"]):
         entry = found.setdefault(name, {"name": name, "corners": [], "grade": None})
-        entry["corners"].append(values)
-        if (row.get("grade") or "").strip():
-            grade = _number(row["grade"], f"{path}: line {line}: grade", faults)
-            if entry["grade"] not in (None, grade):
-                faults.append(f"{path}: line {line}: grade: '{name}' has another grade above")
-            entry["grade"] = grade
+        entry["corners"].append([float(table.number[key][k]) for key in "xy"])
+        grade = float(grades[k])
+        if math.isnan(grade):
+            continue
+        if entry["grade"] not in (None, grade):
+            line = table.line[k]
+            faults.append(f"{path}: line {line}: grade: '{name}' has another grade above")
+        entry["grade"] = grade
     if faults:
         raise SpecError("\n".join(faults))
     return {"polygons": list(found.values())}
-
-
-def _number(text: str | None, where: str, faults: list[str]) -> float:
-    try:
-        number = float(text or "")
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
-        faults.append(f"{where}: '{text or ''}' is not a number")
-    return number
 
 
 def _shape_faults(polygons: tuple[OrePolygon, ...], bench: Bench | None) -> list[str]:

@@ -174,6 +174,7 @@ def write_results(
     timeless = {k: v for k, v in document.items() if k not in ("seconds", "packing_reused")}
     files = [
         write_with(folder / "final_state.npz", lambda name: np.savez_compressed(name, **stored)),
+        write_with(folder / "surface.npz", lambda name: np.savez(name, **surface._asdict())),
         write_csv(folder / "profile.csv", profile_columns(surface, sections, ground)),
         write_csv(folder / "history.csv", history_columns(result.history)),
         write_csv(folder / "blocks.csv", block_columns(case, after, bench)),
