@@ -15,7 +15,7 @@ from castblast.muckpile.fragments import (
     cut_sizes,
     smallest_for_count,
 )
-from castblast.muckpile.packing import check_sizes, sizes_for_count
+from castblast.muckpile.packing import check_sizes, sizes_for_count, solid_volume
 from castblast.muckpile.sizes import Sizes, normal_sizes, uniform_sizes
 from castblast.specs.fragments import FragmentsSpec, fragment_curve
 from castblast.specs.loading import Spec
@@ -23,6 +23,7 @@ from castblast.specs.quantity import QuantityError, QuantityIn
 
 #: With more the smallest of a normal distribution would have no size.
 _WIDEST_NORMAL = 0.4
+_ROUNDS = 6
 
 
 class BallsSpec(Spec):
@@ -119,9 +120,12 @@ def _choose(spec: BallsSpec, bench: Bench, design: Mapping[str, Any]) -> ChosenS
         return ChosenSizes(sizes_for_count(bench, sizes, spec.count or 0, spec.solid_fraction))
     curve = fragment_curve(spec.fragments, bench, design)
     largest = spec.fragments.largest or coarsest(curve)
-    smallest = spec.fragments.smallest
-    if smallest is None:
-        solid = spec.solid_fraction * bench_volume(bench)
-        smallest = smallest_for_count(curve, largest, solid, spec.count or 0)
-    cut = cut_sizes(curve, smallest, largest)
+    if spec.fragments.smallest is not None:
+        cut = cut_sizes(curve, spec.fragments.smallest, largest)
+        return ChosenSizes(cut.sizes, cut, curve)
+    # What the balls leave free along the walls depends on their size, a little.
+    solid = spec.solid_fraction * bench_volume(bench)
+    for _ in range(_ROUNDS):
+        cut = cut_sizes(curve, smallest_for_count(curve, largest, solid, spec.count or 0), largest)
+        solid = solid_volume(bench, cut.sizes, spec.solid_fraction)
     return ChosenSizes(cut.sizes, cut, curve)
