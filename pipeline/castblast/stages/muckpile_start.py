@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -128,7 +129,7 @@ def _read_packing(path: Path, key: str) -> Start | None:
             balls = particles_at_rest(stored["x"], stored["r"])
             fraction, settled = float(stored["solid_fraction"]), bool(stored["settled"])
             return Start(balls, fraction, settled=settled, reused=True)
-    except (OSError, ValueError, KeyError, EOFError):
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None
 
 
