@@ -7,32 +7,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from castblast.muckpile.bench import Bench, assign_blocks, block_shape
-from castblast.muckpile.neighbours import (
-    Balls,
-    count_partners,
-    fill_partners,
-    make_grid,
-    sort_by_cell,
-    starts,
-)
+from castblast.muckpile.neighbours import list_pairs, make_grid, sort_by_cell
 
 
-def listed_pairs(position, velocity, radius, skin, horizon):
+def listed_pairs(position, velocity, radius, skin, horizon, held=None):
     """Pairs of the list, as the solver makes it, in the caller's numbering."""
     middle = position + 0.5 * horizon * velocity
     spread = velocity - velocity.mean(axis=0)
     fastest = float(np.sqrt(np.max(np.sum(spread**2, axis=1))))
-    cell = 2.0 * float(radius.max()) + skin + fastest * horizon
-    grid = make_grid(middle.min(axis=0), middle.max(axis=0), cell, len(radius))
-    order, cell_start, slab = sort_by_cell(middle, grid)
+    reach = 2.0 * float(radius.max()) + skin + fastest * horizon
+    grid = make_grid(middle.min(axis=0), middle.max(axis=0), reach, len(radius))
+    path = np.column_stack([position, velocity]).astype(np.float32)
+    order, cell_start, slab = sort_by_cell(path, grid, 0.5 * horizon)
     place = np.column_stack([position, radius])[order]
-    reference = np.column_stack([position, velocity])[order]
+    held = np.zeros(0, dtype=bool) if held is None else held[order]
+    start, partner = list_pairs(
+        place, path[order], held, cell_start, slab, grid, skin, horizon, guess=0.5
+    )
     n = len(radius)
-    balls = Balls(place, np.zeros((n, 8)), np.zeros((n, 8)), reference, order)
-    shape = (balls, cell_start, grid, skin, horizon)
-    start = starts(count_partners(*shape))
-    partner = np.empty(int(start[-1]), dtype=np.int32)
-    fill_partners(*shape, start, partner)
     first = np.repeat(np.arange(n), np.diff(start))
     slab_of = np.searchsorted(slab, np.arange(n), side="right")
     assert np.all(partner > first)
@@ -56,6 +48,7 @@ def test_list_is_complete(seed, count, skin, horizon, flat):
     size = np.array([2.0, 1.0, 0.0 if flat else 1.0])
     position = rng.uniform(0.0, 1.0, (count, 3)) * size
     velocity = rng.normal(0.0, 10.0, (count, 3))
+    position, velocity = (np.float32(path).astype(float) for path in (position, velocity))
     velocity[:, 0] += 12.7
     if horizon == 0.0:
         velocity[:] = 0.0
@@ -69,6 +62,9 @@ def test_list_is_complete(seed, count, skin, horizon, flat):
     near = least < (radius[first] + radius[second] + skin) * (1.0 - 1e-12)
     needed = set(zip(first[near], second[near], strict=True))
     assert needed <= found
+    held = rng.random(count) < 0.5
+    loose = listed_pairs(position, velocity, radius, skin, horizon, held)
+    assert loose == {pair for pair in found if not held[list(pair)].all()}
 
 
 @settings(max_examples=60, deadline=None)

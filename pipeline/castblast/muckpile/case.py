@@ -9,6 +9,7 @@ import numpy as np
 from castblast.errors import Status
 from castblast.muckpile.contact import ContactLaw, check_law
 from castblast.muckpile.particles import FloatArray, IntArray, Particles
+from castblast.muckpile.state import PRECISIONS
 from castblast.muckpile.walls import Walls
 
 
@@ -50,6 +51,9 @@ class CastCase(NamedTuple):
         Of the history and of the test for rest.
     snapshot_interval : float [s]
         0: only the first and the last state.
+    precision : {"float64", "mixed"}
+        Mixed: motion and contact memory are stored in single precision; see
+        `castblast.muckpile.state`.
     """
 
     particles: Particles
@@ -71,6 +75,7 @@ class CastCase(NamedTuple):
     keep_ledger: bool = True
     sample_interval: float = 0.02
     snapshot_interval: float = 0.0
+    precision: str = "float64"
 
 
 class CastHistory(NamedTuple):
@@ -189,6 +194,9 @@ def check_case(case: CastCase) -> list[str]:
         )
     if np.isnan(case.block_delay).any() or (case.block_delay < 0.0).any():
         faults.append("block_delay: a firing time is negative or not a number")
+    if case.precision not in PRECISIONS:
+        allowed = ", ".join(PRECISIONS)
+        faults.append(f"precision = {case.precision!r}: must be one of {allowed}")
     if not 0.0 < case.step_safety < 1.0:
         faults.append(f"step_safety = {case.step_safety:g}: must be above 0 and below 1")
     return faults

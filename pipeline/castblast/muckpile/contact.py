@@ -12,7 +12,9 @@ Conventions: the normal n points from the first to the second partner; F and M a
 contact exerts on the *second* partner, the first receives their opposites; the contact point lies
 in the middle of the overlap, so that forces and moments conserve angular momentum exactly.
 
-A row of contact memory holds F_s (3), M (3), k_n and 2 sqrt(m_c k_n): one cache line.
+A row of contact memory holds F_s (3), M (3), k_n and 2 sqrt(m_c k_n): one cache line in double
+precision, half of one in single. It is written when the contact closes; all arithmetic is done in
+double precision, whatever the rows are stored in.
 """
 
 from __future__ import annotations
@@ -22,12 +24,14 @@ from math import pi, sqrt
 from typing import NamedTuple, TypeAlias
 
 from castblast.kernel import inline_kernel
-from castblast.muckpile.particles import FloatArray
+from castblast.muckpile.particles import FloatArray, RealArray
 
 Vector: TypeAlias = tuple[float, float, float]
 
 #: Words of one row of contact memory.
 ROW = 8
+#: Stands for zero in a denominator; its square root times any force is finite.
+_TINY = 1e-200
 
 
 class DashpotMode(IntEnum):
@@ -168,9 +172,22 @@ def wall_stiffness(radius: float, modulus: float) -> float:
 
 
 @inline_kernel
+def close_contact(
+    memory: RealArray, dash: RealArray, p: int, stiffness: float, mass: float
+) -> None:
+    """Begin the memory of contact `p`: k_n `stiffness` [N m-1], m_c `mass` [kg], no load yet."""
+    for word in range(6):
+        memory[p, word] = 0.0
+    memory[p, 6] = stiffness
+    memory[p, 7] = 2.0 * sqrt(mass * stiffness)
+    if len(dash) > 0:
+        dash[p, 0], dash[p, 1], dash[p, 2] = 0.0, 0.0, 0.0
+
+
+@inline_kernel
 def contact_force(
-    memory: FloatArray,
-    dash: FloatArray,
+    memory: RealArray,
+    dash: RealArray,
     p: int,
     law: Constants,
     friction: float,
@@ -232,34 +249,36 @@ def contact_force(
 
     # vn < 0 while the partners approach.
     push = -law.damping_normal * memory[p, 7] * vn
-    if law.no_tension and fn + push < 0.0:
-        push = -fn
+    if law.no_tension:
+        push = max(push, -fn)
     drag = law.damping_shear * memory[p, 7]
     grip, hidden = fn, 0.0
     if law.cap_on_total:
         grip, hidden = max(fn + push, 0.0), drag
 
-    force = _follow(memory[p, 0], memory[p, 1], memory[p, 2], normal, spin * step)
-    force, slip_work, slips = _grow(force, (vx, vy, vz), ks, step, friction * grip, hidden)
+    turned = _follow(memory[p, 0], memory[p, 1], memory[p, 2], normal, spin * step)
+    force, cut, length = _grow(turned, (vx, vy, vz), ks, step, friction * grip, hidden)
     fx, fy, fz = force
     memory[p, 0], memory[p, 1], memory[p, 2] = fx, fy, fz
-    if slips and law.slip_cut and not law.cap_on_total:
-        drag = 0.0
+    # At the limit is slipping: a frictionless contact slips before its spring has grown.
+    if law.slip_cut and not law.cap_on_total:
+        drag = drag if length < friction * grip else 0.0
 
     wn = roll[0] * nx + roll[1] * ny + roll[2] * nz
     bend = (roll[0] - wn * nx, roll[1] - wn * ny, roll[2] - wn * nz)
     kr = ks * effective_radius * effective_radius
     limit = rolling_friction * effective_radius * grip
-    moment = _follow(memory[p, 3], memory[p, 4], memory[p, 5], normal, spin * step)
-    moment, roll_work, _ = _grow(moment, bend, kr, step, limit, 0.0)
+    bent = _follow(memory[p, 3], memory[p, 4], memory[p, 5], normal, spin * step)
+    moment, roll_cut, roll_length = _grow(bent, bend, kr, step, limit, 0.0)
     memory[p, 3], memory[p, 4], memory[p, 5] = moment
 
     dx, dy, dz = push * nx - drag * vx, push * ny - drag * vy, push * nz - drag * vz
     if len(dash) > 0:
         # Half of the work of the force before and half of the force now, over the same path: the
         # form in which kick-drift-kick integration exchanges energy.
-        work[w, 0] += slip_work
-        work[w, 1] += roll_work
+        held = (fx - hidden * vx, fy - hidden * vy, fz - hidden * vz)
+        work[w, 0] += _slip_work(turned, held, cut, length, ks)
+        work[w, 1] += _slip_work(bent, moment, roll_cut, roll_length, kr)
         work[w, 2] -= (
             0.5
             * step
@@ -274,9 +293,9 @@ def contact_force(
 
 
 @inline_kernel
-def forget_contact(
-    memory: FloatArray,
-    dash: FloatArray,
+def open_contact(
+    memory: RealArray,
+    dash: RealArray,
     p: int,
     shear_ratio: float,
     effective_radius: float,
@@ -285,7 +304,7 @@ def forget_contact(
     work: FloatArray,
     w: int,
 ) -> None:
-    """Clear the memory of a contact that has just opened.
+    """Close the books of a contact that has just opened.
 
     The springs hold almost nothing then, because their limits fell to zero with the normal force;
     what the last step left in them counts as slip. Arguments as in `contact_force`.
@@ -299,35 +318,35 @@ def forget_contact(
         work[w, 2] -= (
             0.5 * step * (dash[p, 0] * slide[0] + dash[p, 1] * slide[1] + dash[p, 2] * slide[2])
         )
-        dash[p, 0], dash[p, 1], dash[p, 2] = 0.0, 0.0, 0.0
-    for word in range(6):
-        memory[p, word] = 0.0
 
 
 @inline_kernel
 def _grow(
     force: Vector, rate: Vector, stiffness: float, step: float, limit: float, drag: float
-) -> tuple[Vector, float, bool]:
+) -> tuple[Vector, float, float]:
     """Let a spring force grow by -stiffness rate dt up to `limit`.
 
     With a `drag` the limit holds for the sum of the spring and a dashpot -drag rate. Returns the
-    force of the spring, the slip work [J] and whether it slips. The work is the mean of the force
-    before and after, times the path that the spring did not take up.
+    force of the spring, its share that is left (below 1: it slips), and its length before [N].
+    No branch: whether a contact slips cannot be predicted, and a wrong guess costs more.
     """
-    x = force[0] - (stiffness * step + drag) * rate[0]
-    y = force[1] - (stiffness * step + drag) * rate[1]
-    z = force[2] - (stiffness * step + drag) * rate[2]
-    square = x * x + y * y + z * z
-    slip_work = 0.0
-    if square > limit * limit:
-        length = sqrt(square)
-        before = (force[0] * x + force[1] * y + force[2] * z) / length
-        slip_work = 0.5 * (before + limit) * (length - limit) / stiffness
-        cut = limit / length
-        x, y, z = x * cut, y * cut, z * cut
-    # At the limit is slipping: a frictionless contact slips before its spring has grown.
-    slips = square >= limit * limit
-    return (x + drag * rate[0], y + drag * rate[1], z + drag * rate[2]), slip_work, slips
+    grown = stiffness * step + drag
+    x, y, z = force[0] - grown * rate[0], force[1] - grown * rate[1], force[2] - grown * rate[2]
+    length = sqrt(x * x + y * y + z * z)
+    cut = min(1.0, limit / max(length, _TINY))
+    left = (cut * x + drag * rate[0], cut * y + drag * rate[1], cut * z + drag * rate[2])
+    return left, cut, length
+
+
+@inline_kernel
+def _slip_work(before: Vector, left: Vector, cut: float, length: float, stiffness: float) -> float:
+    """Work [J] of a slip: mean of the force before and after, times the path not taken up."""
+    if cut >= 1.0 or length == 0.0:
+        return 0.0
+    mean = before[0] * left[0] + before[1] * left[1] + before[2] * left[2]
+    limit = cut * length
+    mean = 0.5 * (mean / limit + limit) if limit > 0.0 else 0.0
+    return mean * (length - limit) / stiffness
 
 
 @inline_kernel
@@ -335,8 +354,6 @@ def _follow(x: float, y: float, z: float, normal: Vector, angle: float) -> Vecto
     """Carry a tangential vector into the plane of `normal` and turn it by a small `angle`."""
     nx, ny, nz = normal
     square = x * x + y * y + z * z
-    if square == 0.0:
-        return 0.0, 0.0, 0.0
     along = x * nx + y * ny + z * nz
     x -= along * nx
     y -= along * ny
@@ -344,16 +361,14 @@ def _follow(x: float, y: float, z: float, normal: Vector, angle: float) -> Vecto
     tx = x + angle * (ny * z - nz * y)
     ty = y + angle * (nz * x - nx * z)
     tz = z + angle * (nx * y - ny * x)
-    reached = tx * tx + ty * ty + tz * tz
-    if reached == 0.0:
-        return 0.0, 0.0, 0.0
-    scale = sqrt(square / reached)
+    # Nothing stays nothing.
+    scale = sqrt(square / max(tx * tx + ty * ty + tz * tz, _TINY))
     return tx * scale, ty * scale, tz * scale
 
 
 @inline_kernel
 def spring_energy(
-    memory: FloatArray, p: int, overlap: float, effective_radius: float, shear_ratio: float
+    memory: RealArray, p: int, overlap: float, effective_radius: float, shear_ratio: float
 ) -> float:
     """Elastic energy [J] of contact `p`: normal, shear and rolling spring."""
     kn = float(memory[p, 6])

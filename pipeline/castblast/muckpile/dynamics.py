@@ -2,8 +2,13 @@
 
 Velocity Verlet with one force evaluation per step; the dashpots see the velocity of the half step,
 as in the leapfrog of PFC and in LAMMPS. Both half kicks are always made apart, so that stopping
-between two steps (for a picture, a firing, a sample) changes no bit of the motion. Left out:
-multi-rate stepping and sleeping balls.
+between two steps (for a picture, a firing, a sample) changes no bit of the motion.
+
+A step is one sweep over the slabs in order: when the pairs of a slab are done, its balls have all
+their forces, nobody asks for their positions any more, and they are moved on at once while they
+are in the cache. Several sweeps run side by side, each over a *chunk* of slabs; the last slab of a
+chunk touches the next one, so its pairs are done before. The chunks do not depend on the number of
+threads, hence neither does any sum. Left out: multi-rate stepping.
 """
 
 from __future__ import annotations
@@ -11,36 +16,61 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
-from castblast.kernel import inline_kernel, kernel, lean_kernel, parallel_kernel
+from castblast.kernel import inline_kernel, lean_kernel, parallel_kernel
 from castblast.muckpile.contact import Constants
 from castblast.muckpile.forces import pair_forces, wall_forces
-from castblast.muckpile.neighbours import Balls, Contacts
-from castblast.muckpile.particles import FloatArray, IntArray
+from castblast.muckpile.particles import FloatArray, IntArray, RealArray
+from castblast.muckpile.state import Balls, Contacts
+
+#: Most sweeps that run side by side; more threads than that have nothing to do.
+MOST_CHUNKS = 32
+#: Least work of a chunk, in the unit of `cut_chunks`: balls and contacts.
+LEAST_WORK = 2000
+
+
+def cut_chunks(load: IntArray) -> IntArray:
+    """Cut slabs into chunks of at least two slabs and about equal work.
+
+    Parameters
+    ----------
+    load : array (s + 1,)
+        Running total of the work of the slabs.
+
+    Returns
+    -------
+    array (c + 1,)
+        First slab of each chunk, and the number of slabs.
+    """
+    slabs = len(load) - 1
+    chunks = max(1, min(MOST_CHUNKS, slabs // 3, int(load[-1]) // LEAST_WORK))
+    cuts = np.searchsorted(load, load[-1] * np.arange(chunks + 1) / chunks).astype(np.int64)
+    cuts[0], cuts[-1] = 0, slabs
+    kept = [0]
+    for cut in cuts[1:-1]:
+        if cut >= kept[-1] + 2 and cut <= slabs - 2:
+            kept.append(int(cut))
+    return np.array([*kept, slabs], dtype=np.int64)
 
 
 @inline_kernel
 def _kick(
-    radius: float, motion: FloatArray, force: FloatArray, i: int, gravity: float, half: float
+    motion: RealArray, force: RealArray, i: int, light: float, spin: float, fall: float
 ) -> None:
-    """Half a step of acceleration for ball `i`, unless it is held."""
-    if motion[i, 7] != 0.0:
-        return
-    per_mass = half / motion[i, 6]
-    per_inertia = per_mass / (0.4 * radius * radius)
-    motion[i, 0] += force[i, 0] * per_mass
-    motion[i, 1] += force[i, 1] * per_mass
-    motion[i, 2] += force[i, 2] * per_mass - gravity * half
-    motion[i, 3] += force[i, 3] * per_inertia
-    motion[i, 4] += force[i, 4] * per_inertia
-    motion[i, 5] += force[i, 5] * per_inertia
+    """Half a step of acceleration: half step over mass, over moment of inertia, and g times it."""
+    motion[i, 0] += force[i, 0] * light
+    motion[i, 1] += force[i, 1] * light
+    motion[i, 2] += force[i, 2] * light - fall
+    motion[i, 3] += force[i, 3] * spin
+    motion[i, 4] += force[i, 4] * spin
+    motion[i, 5] += force[i, 5] * spin
 
 
 @inline_kernel
 def _drift(
     place: FloatArray,
-    motion: FloatArray,
-    force: FloatArray,
-    reference: FloatArray,
+    motion: RealArray,
+    force: RealArray,
+    reference: RealArray,
     i: int,
     step: float,
     elapsed: float,
@@ -57,35 +87,33 @@ def _drift(
 
 
 @lean_kernel
-def _pass_pairs(
+def _do_pairs(
     balls: Balls,
     pairs: Contacts,
-    slab: IntArray,
     first: int,
     last: int,
-    parity: int,
     law: Constants,
     step: float,
     work: FloatArray,
+    w: int,
 ) -> None:
-    """Pair forces of the slabs of one parity in first .. last - 1."""
+    """Pair forces of the balls first .. last - 1; `work` is booked in row `w`."""
     place, motion, force = balls.place, balls.motion, balls.force
     start, partner, memory = pairs.start, pairs.partner, pairs.memory
     touching, dash = pairs.touching, pairs.dash
-    for s in range(first + (first + parity) % 2, last, 2):
-        for i in range(slab[s], slab[s + 1]):
+    for i in range(first, last):
+        if start[i] < start[i + 1]:
             pair_forces(
                 place, motion, force, partner, memory, touching, dash,
-                start[i], start[i + 1], i, law, step, work, s,
+                start[i], start[i + 1], i, law, step, work, w,
             )  # fmt: skip
 
 
 @lean_kernel
-def _pass_balls(
+def _do_balls(
     balls: Balls,
     touches: Contacts,
     walls: FloatArray,
-    slab: IntArray,
     first: int,
     last: int,
     law: Constants,
@@ -94,32 +122,68 @@ def _pass_balls(
     step: float,
     elapsed: float,
     work: FloatArray,
+    w: int,
 ) -> float:
-    """End the pending step of the balls in slabs first .. last - 1, begin the next.
+    """Walls, second kick of the pending step, then first kick and drift of the next one.
 
-    A `pending` below zero: no step is under way. A `step` of zero: no other is begun. Returns the
-    largest square [m2] of the way off the straight path.
+    A negative `pending` or a zero `step` leaves out its part. Returns the largest square [m2] of
+    the way off the straight path, `elapsed` after the lists were made.
     """
-    place, motion, force = balls.place, balls.motion, balls.force
-    reference = balls.reference
+    place, motion, force, reference = balls.place, balls.motion, balls.force, balls.reference
     start, partner, memory = touches.start, touches.partner, touches.memory
     touching, dash = touches.touching, touches.dash
     largest = 0.0
+    for i in range(first, last):
+        if motion[i, 7] != 0.0:
+            continue
+        per_mass = 0.5 / motion[i, 6]
+        per_inertia = per_mass / (0.4 * place[i, 3] * place[i, 3])
+        if pending >= 0.0:
+            if start[i] < start[i + 1]:
+                wall_forces(
+                    place, motion, force, partner, memory, touching, dash,
+                    start[i], start[i + 1], walls, i, law, pending, work, w,
+                )  # fmt: skip
+            _kick(
+                motion, force, i,
+                per_mass * pending, per_inertia * pending, 0.5 * gravity * pending,
+            )  # fmt: skip
+        if step > 0.0:
+            _kick(motion, force, i, per_mass * step, per_inertia * step, 0.5 * gravity * step)
+            off = _drift(place, motion, force, reference, i, step, elapsed)
+            # A state that is not finite counts as far off.
+            if not off <= largest:
+                largest = off if off == off else np.inf
+    return largest
+
+
+@lean_kernel
+def _sweep(
+    balls: Balls,
+    pairs: Contacts,
+    touches: Contacts,
+    walls: FloatArray,
+    slab: IntArray,
+    first: int,
+    last: int,
+    ends: bool,
+    law: Constants,
+    gravity: float,
+    pending: float,
+    step: float,
+    elapsed: float,
+    work: FloatArray,
+) -> float:
+    """Pass over the slabs first .. last - 1; `ends`: no chunk follows, the last pairs are left."""
+    largest = 0.0
     for s in range(first, last):
-        for i in range(slab[s], slab[s + 1]):
-            if pending >= 0.0:
-                if start[i] < start[i + 1]:
-                    wall_forces(
-                        place, motion, force, partner, memory, touching, dash,
-                        start[i], start[i + 1], walls, i, law, pending, work, s,
-                    )  # fmt: skip
-                _kick(place[i, 3], motion, force, i, gravity, 0.5 * pending)
-            if step > 0.0:
-                _kick(place[i, 3], motion, force, i, gravity, 0.5 * step)
-                off = _drift(place, motion, force, reference, i, step, elapsed)
-                # A state that is not finite counts as far off.
-                if not off <= largest:
-                    largest = off if off == off else np.inf
+        here, there = slab[s], slab[s + 1]
+        if pending >= 0.0 and (ends or s < last - 1):
+            _do_pairs(balls, pairs, here, there, law, pending, work, s)
+        off = _do_balls(
+            balls, touches, walls, here, there, law, gravity, pending, step, elapsed, work, s
+        )
+        largest = max(largest, off)
     return largest
 
 
@@ -130,7 +194,7 @@ def advance(
     touches: Contacts,
     walls: FloatArray,
     slab: IntArray,
-    part: IntArray,
+    chunk: IntArray,
     law: Constants,
     gravity: float,
     steps: int,
@@ -154,8 +218,8 @@ def advance(
         See `castblast.muckpile.walls.wall_table`.
     slab : array (s + 1,)
         First ball of each slab.
-    part : array (threads + 1,)
-        First slab of each thread's share.
+    chunk : array (c + 1,)
+        First slab of each chunk.
     law : Constants
     gravity : float [m s-2]
     steps : int
@@ -182,29 +246,21 @@ def advance(
     pending, clock : float
         As on entry. The clock is summed step by step, so that it is the same wherever one stops.
     """
-    workers = len(part) - 1
-    off = np.zeros(workers)
+    chunks = len(chunk) - 1
+    off = np.zeros(chunks)
     ended, begun = 0, 0
-    if pending < 0.0:
-        clock += step
-        elapsed = clock - built
-        for w in prange(workers):
-            off[w] = _pass_balls(
-                balls, touches, walls, slab, part[w], part[w + 1],
-                law, gravity, -1.0, step, elapsed, work,
-            )  # fmt: skip
-        begun += 1
-        pending = step
-    while not (clock - built > horizon or not off.max() <= allowed * allowed):
-        for parity in range(2):
-            for w in prange(workers):
-                _pass_pairs(balls, pairs, slab, part[w], part[w + 1], parity, law, pending, work)
-        ended += 1
-        following = step if ended < steps else 0.0
+    while pending < 0.0 or not (clock - built > horizon or not off.max() <= allowed * allowed):
+        following = step if pending < 0.0 or ended + 1 < steps else 0.0
+        if pending >= 0.0:
+            if chunks > 1:
+                for c in prange(chunks - 1):
+                    s = chunk[c + 1] - 1
+                    _do_pairs(balls, pairs, slab[s], slab[s + 1], law, pending, work, s)
+            ended += 1
         elapsed = clock + following - built
-        for w in prange(workers):
-            off[w] = _pass_balls(
-                balls, touches, walls, slab, part[w], part[w + 1],
+        for c in prange(chunks):
+            off[c] = _sweep(
+                balls, pairs, touches, walls, slab, chunk[c], chunk[c + 1], c == chunks - 1,
                 law, gravity, pending, following, elapsed, work,
             )  # fmt: skip
         if following == 0.0:
@@ -215,18 +271,25 @@ def advance(
     return ended, begun, pending, clock
 
 
-@kernel
-def first_forces(
+@parallel_kernel
+def present_forces(
     balls: Balls,
     pairs: Contacts,
     touches: Contacts,
     walls: FloatArray,
+    slab: IntArray,
+    chunk: IntArray,
     law: Constants,
-    gravity: float,
     work: FloatArray,
 ) -> None:
-    """Forces of the initial state: springs by overlap, no shear and no moment yet."""
+    """Forces of a state as it stands: no contact is loaded any further."""
+    chunks = len(chunk) - 1
     balls.force[:] = 0.0
-    everything = np.array([0, len(balls.place)])
-    _pass_pairs(balls, pairs, everything, 0, 1, 0, law, 0.0, work)
-    _pass_balls(balls, touches, walls, everything, 0, 1, law, gravity, 0.0, 0.0, 0.0, work)
+    for c in prange(chunks - 1):
+        s = chunk[c + 1] - 1
+        _do_pairs(balls, pairs, slab[s], slab[s + 1], law, 0.0, work, s)
+    for c in prange(chunks):
+        _sweep(
+            balls, pairs, touches, walls, slab, chunk[c], chunk[c + 1], c == chunks - 1,
+            law, 0.0, 0.0, 0.0, 0.0, work,
+        )  # fmt: skip

@@ -12,20 +12,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from castblast.kernel import inline_kernel
-from castblast.muckpile.contact import Constants, contact_force, forget_contact
-from castblast.muckpile.particles import FloatArray
+from castblast.muckpile.contact import (
+    Constants,
+    ball_stiffness,
+    close_contact,
+    contact_force,
+    open_contact,
+    wall_stiffness,
+)
+from castblast.muckpile.particles import FloatArray, RealArray
 from castblast.muckpile.walls import FRICTION, ROLLING_FRICTION, wall_distance
 
 
 @inline_kernel
 def pair_forces(
     place: FloatArray,
-    motion: FloatArray,
-    force: FloatArray,
+    motion: RealArray,
+    force: RealArray,
     partner: NDArray[np.int32],
-    memory: FloatArray,
+    memory: RealArray,
     touching: NDArray[np.uint8],
-    dash: FloatArray,
+    dash: RealArray,
     first: int,
     last: int,
     i: int,
@@ -48,7 +55,8 @@ def pair_forces(
             continue
         distance = sqrt(square)
         overlap = radii - distance
-        nx, ny, nz = dx / distance, dy / distance, dz / distance
+        per_distance = 1.0 / distance
+        nx, ny, nz = dx * per_distance, dy * per_distance, dz * per_distance
         arm = radius - 0.5 * overlap
         other = place[j, 3] - 0.5 * overlap
         ax, ay, az = motion[j, 3], motion[j, 4], motion[j, 5]
@@ -60,10 +68,16 @@ def pair_forces(
         )
         effective = radius * place[j, 3] / radii
         if overlap <= 0.0:
-            touching[p] = 0
-            forget_contact(memory, dash, p, law.shear_ratio, effective, slide, step, work, w)
+            # Two balls that just meet may pass the test above and yet have no overlap.
+            if touching[p]:
+                touching[p] = 0
+                open_contact(memory, dash, p, law.shear_ratio, effective, slide, step, work, w)
             continue
-        touching[p] = 1
+        if not touching[p]:
+            touching[p] = 1
+            stiffness = ball_stiffness(radius, place[j, 3], law.modulus)
+            mass = motion[i, 6] * motion[j, 6] / (motion[i, 6] + motion[j, 6])
+            close_contact(memory, dash, p, stiffness, mass)
         (px, py, pz), (mx, my, mz) = contact_force(
             memory,
             dash,
@@ -105,12 +119,12 @@ def pair_forces(
 @inline_kernel
 def wall_forces(
     place: FloatArray,
-    motion: FloatArray,
-    force: FloatArray,
+    motion: RealArray,
+    force: RealArray,
     partner: NDArray[np.int32],
-    memory: FloatArray,
+    memory: RealArray,
     touching: NDArray[np.uint8],
-    dash: FloatArray,
+    dash: RealArray,
     first: int,
     last: int,
     walls: FloatArray,
@@ -139,9 +153,12 @@ def wall_forces(
         )
         if overlap <= 0.0:
             touching[p] = 0
-            forget_contact(memory, dash, p, law.shear_ratio, radius, slide, step, work, w)
+            open_contact(memory, dash, p, law.shear_ratio, radius, slide, step, work, w)
             continue
-        touching[p] = 1
+        if not touching[p]:
+            touching[p] = 1
+            stiffness = wall_stiffness(radius, law.modulus)
+            close_contact(memory, dash, p, stiffness, motion[i, 6])
         (px, py, pz), (mx, my, mz) = contact_force(
             memory,
             dash,

@@ -5,10 +5,10 @@ stays complete as long as no ball is more than half a skin off its own straight 
 reference velocity of zero and no horizon this is the list of Verlet (1967); with the true
 velocities it is insensitive to common flight, in which most of a cast happens.
 
-Balls are kept in the order of their cells, layer by layer along x (a *slab* is one layer). Each
-pair belongs to the ball that comes first, and its partner lies in the same or in the next slab:
-all even slabs may be worked on at once, then all odd ones, without two of them touching the same
-ball, and the sum at a ball is formed in an order that does not depend on the number of threads.
+Balls are kept in the order of their cells, layer by layer along the longest side of the crowd (a
+*slab* is one layer). Each pair belongs to the ball that comes first, and its partner lies in the
+same or in the next slab: slabs can be worked on in order, or apart, without two of them touching
+the same ball. Everything here is cut into pieces that do not depend on the number of threads.
 """
 
 from __future__ import annotations
@@ -19,216 +19,313 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
-from castblast.kernel import inline_kernel, kernel, parallel_kernel
-from castblast.muckpile.contact import ROW, ball_stiffness, wall_stiffness
-from castblast.muckpile.particles import FloatArray, IntArray
+from castblast.kernel import inline_kernel, lean_kernel, parallel_kernel
+from castblast.muckpile.particles import FloatArray, Int32Array, IntArray, RealArray
+from castblast.muckpile.state import starts
 from castblast.muckpile.walls import wall_distance
 
-
-class Balls(NamedTuple):
-    """State of the balls in the order of their cells, one cache line or less per row.
-
-    Attributes
-    ----------
-    place : array (n, 4) [m]
-        Centre and radius.
-    motion : array (n, 8)
-        Velocity [m s-1], spin [rad s-1], mass [kg], and 1.0 where the ball is held in place.
-    force : array (n, 8)
-        Force [N], moment [N m], two unused words.
-    reference : array (n, 6)
-        Centre and velocity when the list was built.
-    identity : array (n,), int64
-        Index of the ball in the caller's arrays.
-    """
-
-    place: FloatArray
-    motion: FloatArray
-    force: FloatArray
-    reference: FloatArray
-    identity: IntArray
-
-
-class Contacts(NamedTuple):
-    """Candidate contacts, those of ball i in ``start[i]:start[i + 1]``, with their memory.
-
-    Attributes
-    ----------
-    start : array (n + 1,), int64
-    partner : array (p,), int32
-        Index of the second ball (always larger), or of the wall.
-    memory : array (p, 8)
-        See `castblast.muckpile.contact`.
-    touching : array (p,), uint8
-    dash : array (p, 3) or (0, 3) [N]
-        Dashpot force of the last step; empty when no ledger is kept.
-    """
-
-    start: IntArray
-    partner: NDArray[np.int32]
-    memory: FloatArray
-    touching: NDArray[np.uint8]
-    dash: FloatArray
+#: Pieces into which passes over all balls are cut; fixed, so that sums do not depend on threads.
+PIECES = 32
+#: Cells of the second and third direction are this many to the reach of a pair.
+FINE = 2
 
 
 class Grid(NamedTuple):
-    """Cells of a box: lower corner [m], cells per metre, number of cells along x, y, z."""
+    """Cells of a box.
 
-    x: float
-    y: float
-    z: float
-    per_x: float
-    per_y: float
-    per_z: float
-    nx: int
-    ny: int
-    nz: int
+    Attributes
+    ----------
+    axis1, axis2, axis3 : int
+        Axes of space: along slabs, columns and cells.
+    low1, low2, low3 : float [m]
+        Lower corner.
+    per1, per2, per3 : float [m-1]
+        Cells per metre.
+    n1, n2, n3 : int
+        Number of cells.
+    """
+
+    axis1: int
+    axis2: int
+    axis3: int
+    low1: float
+    low2: float
+    low3: float
+    per1: float
+    per2: float
+    per3: float
+    n1: int
+    n2: int
+    n3: int
 
 
-def make_grid(lower: FloatArray, upper: FloatArray, cell: float, count: int) -> Grid:
-    """Cut the box into cells of at least `cell` [m]; at most about 8 cells per ball."""
+def make_grid(lower: FloatArray, upper: FloatArray, reach: float, count: int) -> Grid:
+    """Cut the box into slabs of at least `reach` [m] and finer cells; at most about 8 per ball."""
     extent = np.maximum(upper - lower, 1e-9)
-    size = cell
+    axes = np.argsort(-extent, kind="stable")
+    extent, low = extent[axes], lower[axes]
+    fine = np.array([1.0, FINE, FINE])
+    size = reach
     while True:
-        shape = np.maximum(np.floor(np.minimum(extent / size, 1e6)), 1.0)
+        shape = np.maximum(np.floor(np.minimum(fine * extent / size, 1e6)), 1.0)
         if shape.prod() <= 8.0 * count + 64.0:
             break
         size *= 1.25
-    per = shape / extent
-    x, y, z = map(float, lower)
-    per_x, per_y, per_z = map(float, per)
-    nx, ny, nz = map(int, shape)
-    return Grid(x, y, z, per_x, per_y, per_z, nx, ny, nz)
+    axis1, axis2, axis3 = map(int, axes)
+    low1, low2, low3 = map(float, low)
+    per1, per2, per3 = map(float, shape / extent)
+    n1, n2, n3 = map(int, shape)
+    return Grid(axis1, axis2, axis3, low1, low2, low3, per1, per2, per3, n1, n2, n3)
 
 
 @inline_kernel
-def _cell(grid: Grid, x: float, y: float, z: float) -> tuple[int, int, int]:
-    i = min(max(int((x - grid.x) * grid.per_x), 0), grid.nx - 1)
-    j = min(max(int((y - grid.y) * grid.per_y), 0), grid.ny - 1)
-    k = min(max(int((z - grid.z) * grid.per_z), 0), grid.nz - 1)
-    return i, j, k
+def _cell(grid: Grid, point: RealArray, i: int, time: float) -> tuple[int, int, int]:
+    """Cell of row `i` of `point`, (n, 3) or with velocities (n, 6), after flying for `time`."""
+    x, y, z = point[i, grid.axis1] + 0.0, point[i, grid.axis2] + 0.0, point[i, grid.axis3] + 0.0
+    if time > 0.0:
+        x += time * point[i, grid.axis1 + 3]
+        y += time * point[i, grid.axis2 + 3]
+        z += time * point[i, grid.axis3 + 3]
+    a = min(max(int((x - grid.low1) * grid.per1), 0), grid.n1 - 1)
+    b = min(max(int((y - grid.low2) * grid.per2), 0), grid.n2 - 1)
+    c = min(max(int((z - grid.low3) * grid.per3), 0), grid.n3 - 1)
+    return a, b, c
 
 
-@kernel
-def sort_by_cell(point: FloatArray, grid: Grid) -> tuple[IntArray, IntArray, IntArray]:
-    """Counting sort of points (n, 3): their new order (n,), the start of each cell, of each slab.
+@parallel_kernel
+def sort_by_cell(
+    point: RealArray, grid: Grid, time: float = 0.0
+) -> tuple[Int32Array, Int32Array, IntArray]:
+    """Counting sort of points: their new order (n,), the start of each cell, of each slab.
 
-    Balls of one cell keep their order.
+    Balls of one cell keep their order. First into slabs, then each slab into cells.
+
+    Parameters
+    ----------
+    point : array (n, 3) or (n, 6), real [m, m s-1]
+    grid : Grid
+    time : float [s]
+        Sort by where the points are after flying for this time.
     """
-    count = len(point)
-    cells = grid.nx * grid.ny * grid.nz
-    start = np.zeros(cells + 1, np.int64)
-    where = np.empty(count, np.int64)
-    for n in range(count):
-        i, j, k = _cell(grid, point[n, 0], point[n, 1], point[n, 2])
-        where[n] = (i * grid.ny + j) * grid.nz + k
-        start[where[n] + 1] += 1
-    for c in range(cells):
-        start[c + 1] += start[c]
-    free = start[:-1].copy()
-    order = np.empty(count, np.int64)
-    for n in range(count):
-        order[free[where[n]]] = n
-        free[where[n]] += 1
-    slab = start[:: grid.ny * grid.nz].copy()
+    count, layer = len(point), grid.n2 * grid.n3
+    cell = np.empty(count, np.int32)
+    table = np.zeros((PIECES, grid.n1), np.int32)
+    for piece in prange(PIECES):
+        for n in range(piece * count // PIECES, (piece + 1) * count // PIECES):
+            a, b, c = _cell(grid, point, n, time)
+            cell[n] = (a * grid.n2 + b) * grid.n3 + c
+            table[piece, a] += 1
+    slab = np.zeros(grid.n1 + 1, np.int64)
+    total = 0
+    for a in range(grid.n1):
+        for piece in range(PIECES):
+            here = table[piece, a]
+            table[piece, a] = total
+            total += here
+        slab[a + 1] = total
+    rough = np.empty(count, np.int32)
+    for piece in prange(PIECES):
+        for n in range(piece * count // PIECES, (piece + 1) * count // PIECES):
+            a = cell[n] // layer
+            rough[table[piece, a]] = n
+            table[piece, a] += 1
+    order = np.empty(count, np.int32)
+    start = np.empty(grid.n1 * layer + 1, np.int32)
+    start[-1] = count
+    for a in prange(grid.n1):
+        _sort_slab(cell, rough, order, start, slab[a], slab[a + 1], a * layer, layer)
     return order, start, slab
 
 
-@inline_kernel
-def _approach(ref: FloatArray, i: int, j: int, horizon: float) -> float:
-    """Square of the least distance [m2] of two straight reference paths before the horizon."""
-    dx, dy, dz = ref[j, 0] - ref[i, 0], ref[j, 1] - ref[i, 1], ref[j, 2] - ref[i, 2]
-    vx, vy, vz = ref[j, 3] - ref[i, 3], ref[j, 4] - ref[i, 4], ref[j, 5] - ref[i, 5]
-    closing = -(dx * vx + dy * vy + dz * vz)
-    if closing > 0.0:
-        time = min(closing / (vx * vx + vy * vy + vz * vz), horizon)
-        dx += vx * time
-        dy += vy * time
-        dz += vz * time
-    return float(dx * dx + dy * dy + dz * dz)
-
-
-@inline_kernel
-def _search(
-    place: FloatArray,
-    ref: FloatArray,
-    cell_start: IntArray,
-    grid: Grid,
-    skin: float,
-    horizon: float,
-    i: int,
-    found: NDArray[np.int32],
-    at: int,
-) -> int:
-    """Count the partners of ball `i` that come after it; write them to ``found[at:]`` if at >= 0.
-
-    Cells run along z first, so the forward half of the neighbourhood is five runs of balls: the
-    rest of the own column, one column beside it, and three columns of the next slab.
-    """
-    half = 0.5 * horizon
-    ci, cj, ck = _cell(
-        grid,
-        ref[i, 0] + half * ref[i, 3],
-        ref[i, 1] + half * ref[i, 4],
-        ref[i, 2] + half * ref[i, 5],
-    )
-    low, high = max(ck - 1, 0), min(ck + 1, grid.nz - 1)
-    reach = place[i, 3] + skin
-    count = 0
-    for run in range(5):
-        a = ci if run < 2 else ci + 1
-        b = cj + run if run < 2 else cj + run - 3
-        if a >= grid.nx or b < 0 or b >= grid.ny:
-            continue
-        column = (a * grid.ny + b) * grid.nz
-        first = i + 1 if run == 0 else cell_start[column + low]
-        for j in range(first, cell_start[column + high + 1]):
-            limit = reach + place[j, 3]
-            if _approach(ref, i, j, horizon) < limit * limit:
-                if at >= 0:
-                    found[at + count] = j
-                count += 1
-    return count
-
-
-@parallel_kernel
-def count_partners(
-    balls: Balls, cell_start: IntArray, grid: Grid, skin: float, horizon: float
-) -> IntArray:
-    """Return the number of partners (n,) that each ball owns in the list."""
-    number = np.empty(len(balls.place), np.int64)
-    nowhere = np.empty(0, np.int32)
-    place, ref = balls.place, balls.reference
-    for i in prange(len(number)):
-        number[i] = _search(place, ref, cell_start, grid, skin, horizon, i, nowhere, -1)
-    return number
-
-
-@parallel_kernel
-def fill_partners(
-    balls: Balls,
-    cell_start: IntArray,
-    grid: Grid,
-    skin: float,
-    horizon: float,
-    start: IntArray,
-    partner: NDArray[np.int32],
+@lean_kernel
+def _sort_slab(
+    cell: Int32Array,
+    rough: Int32Array,
+    order: Int32Array,
+    start: Int32Array,
+    first: int,
+    last: int,
+    origin: int,
+    layer: int,
 ) -> None:
-    """Write the partners that `count_partners` counted."""
-    place, ref = balls.place, balls.reference
-    for i in prange(len(start) - 1):
-        _search(place, ref, cell_start, grid, skin, horizon, i, partner, start[i])
+    """Order the balls rough[first:last] of one slab by cell, and write where its cells start."""
+    for c in range(origin, origin + layer):
+        start[c] = 0
+    for k in range(first, last):
+        start[cell[rough[k]]] += 1
+    # From the end of each cell down, so that afterwards each entry is the start of its cell.
+    end = first
+    for c in range(origin, origin + layer):
+        end += start[c]
+        start[c] = end
+    for k in range(last - 1, first - 1, -1):
+        n = rough[k]
+        start[cell[n]] -= 1
+        order[start[cell[n]]] = n
+
+
+@inline_kernel
+def _may_meet(
+    place: FloatArray, ref: RealArray, i: int, j: int, reach: float, horizon: float
+) -> bool:
+    """Whether two straight paths come within touch and skin (`reach`: R_i + skin) in time."""
+    limit = reach + place[j, 3]
+    dx = float(ref[j, 0]) - ref[i, 0]
+    dy = float(ref[j, 1]) - ref[i, 1]
+    dz = float(ref[j, 2]) - ref[i, 2]
+    square = dx * dx + dy * dy + dz * dz
+    if square < limit * limit:
+        return True
+    if horizon == 0.0:
+        return False
+    vx = float(ref[j, 3]) - ref[i, 3]
+    vy = float(ref[j, 4]) - ref[i, 4]
+    vz = float(ref[j, 5]) - ref[i, 5]
+    closing = -(dx * vx + dy * vy + dz * vz)
+    if closing <= 0.0:
+        return False
+    speed = vx * vx + vy * vy + vz * vz
+    time = min(closing / speed, horizon)
+    return bool(square - time * (2.0 * closing - time * speed) < limit * limit)
+
+
+@lean_kernel
+def _search_slab(
+    place: FloatArray,
+    ref: RealArray,
+    held: NDArray[np.bool_],
+    cell_start: Int32Array,
+    grid: Grid,
+    skin: float,
+    horizon: float,
+    first: int,
+    last: int,
+    number: Int32Array,
+    found: Int32Array,
+    at: int,
+    end: int,
+) -> int:
+    """Partners of the balls first .. last - 1 that come after them, into ``found[at:end]``.
+
+    Returns where they end; beyond `end` they are counted only. The forward half of the
+    neighbourhood is the rest of the own column, the columns beside it, and those of the next slab.
+    """
+    some_held = len(held) > 0
+    for i in range(first, last):
+        ca, cb, cc = _cell(grid, ref, i, 0.5 * horizon)
+        low, high = max(cc - FINE, 0), min(cc + FINE, grid.n3 - 1)
+        reach = place[i, 3] + skin
+        before = at
+        for a in range(ca, min(ca + 2, grid.n1)):
+            left = cb if a == ca else max(cb - FINE, 0)
+            for b in range(left, min(cb + FINE + 1, grid.n2)):
+                column = (a * grid.n2 + b) * grid.n3
+                here = a == ca and b == cb
+                begin = i + 1 if here else cell_start[column + low]
+                for j in range(begin, cell_start[column + high + 1]):
+                    if _may_meet(place, ref, i, j, reach, horizon) and not (
+                        some_held and held[i] and held[j]
+                    ):
+                        if at < end:
+                            found[at] = j
+                        at += 1
+        number[i] = at - before
+    return at
+
+
+@parallel_kernel
+def _search_pairs(
+    place: FloatArray,
+    ref: RealArray,
+    held: NDArray[np.bool_],
+    cell_start: Int32Array,
+    slab: IntArray,
+    grid: Grid,
+    skin: float,
+    horizon: float,
+    room: IntArray,
+    number: Int32Array,
+    found: Int32Array,
+) -> IntArray:
+    """Search all slabs; the pairs of slab s go into ``found[room[s]:room[s + 1]]``.
+
+    Returns the number of pairs of each slab, whether they had room or not.
+    """
+    slabs = len(slab) - 1
+    total = np.empty(slabs, np.int64)
+    for s in prange(slabs):
+        total[s] = (
+            _search_slab(
+                place, ref, held, cell_start, grid, skin, horizon,
+                slab[s], slab[s + 1], number, found, room[s], room[s + 1],
+            )
+            - room[s]
+        )  # fmt: skip
+    return total
+
+
+@parallel_kernel
+def _close_ranks(found: Int32Array, room: IntArray, base: IntArray, partner: Int32Array) -> None:
+    """Copy the pairs of each slab from where they had room to where they belong."""
+    for s in prange(len(base) - 1):
+        for k in range(base[s + 1] - base[s]):
+            partner[base[s] + k] = found[room[s] + k]
+
+
+def list_pairs(
+    place: FloatArray,
+    reference: RealArray,
+    held: NDArray[np.bool_],
+    cell_start: Int32Array,
+    slab: IntArray,
+    grid: Grid,
+    skin: float,
+    horizon: float,
+    guess: float = 6.0,
+) -> tuple[Int32Array, Int32Array]:
+    """List the pairs that may meet: start (n + 1,) and partner (p,), as in `Contacts`.
+
+    Parameters
+    ----------
+    place : array (n, 4) [m]
+    reference : array (n, 6), real
+    held : array (n,) or (0,), bool
+        Two balls that are held are no pair; empty: none is held.
+    cell_start, slab : arrays
+        From `sort_by_cell`, whose order the balls are in.
+    grid : Grid
+        Of slabs at least as wide as the reach of a pair.
+    skin : float [m]
+    horizon : float [s]
+    guess : float
+        Pairs per ball for which room is made at first.
+    """
+    number = np.empty(len(place), dtype=np.int32)
+    need = np.ceil(guess * np.diff(slab)).astype(np.int64)
+    while True:
+        room = np.concatenate([[0], np.cumsum(need)])
+        found = np.empty(int(room[-1]), dtype=np.int32)
+        total = _search_pairs(
+            place, reference, held, cell_start, slab, grid, skin, horizon, room, number, found
+        )
+        if np.all(total <= need):
+            break
+        need = total
+    base = np.concatenate([[0], np.cumsum(total)])
+    partner = np.empty(int(base[-1]), dtype=np.int32)
+    _close_ranks(found, room, base, partner)
+    return starts(number), partner
 
 
 @inline_kernel
 def _search_walls(
     place: FloatArray,
-    ref: FloatArray,
+    ref: RealArray,
     walls: FloatArray,
     skin: float,
     horizon: float,
     i: int,
-    found: NDArray[np.int32],
+    found: Int32Array,
     at: int,
 ) -> int:
     """Count the walls that ball `i` may meet; write them to ``found[at:]`` if at >= 0."""
@@ -238,7 +335,7 @@ def _search_walls(
         ref[i, 1] + half * ref[i, 4],
         ref[i, 2] + half * ref[i, 5],
     )
-    speed = np.sqrt(ref[i, 3] ** 2 + ref[i, 4] ** 2 + ref[i, 5] ** 2)
+    speed = np.sqrt(float(ref[i, 3] ** 2 + ref[i, 4] ** 2 + ref[i, 5] ** 2))
     reach = place[i, 3] + 0.5 * skin + half * speed
     count = 0
     for k in range(len(walls)):
@@ -250,117 +347,49 @@ def _search_walls(
     return count
 
 
-@kernel
-def count_walls(balls: Balls, walls: FloatArray, skin: float, horizon: float) -> IntArray:
-    """Return the number of walls (n,) that each ball may meet."""
-    number = np.empty(len(balls.place), np.int64)
-    nowhere = np.empty(0, np.int32)
-    place, ref = balls.place, balls.reference
-    for i in range(len(number)):
-        number[i] = _search_walls(place, ref, walls, skin, horizon, i, nowhere, -1)
-    return number
-
-
-@kernel
-def fill_walls(
-    balls: Balls,
+@parallel_kernel
+def _count_walls(
+    place: FloatArray,
+    ref: RealArray,
+    held: NDArray[np.bool_],
     walls: FloatArray,
     skin: float,
     horizon: float,
-    start: IntArray,
-    partner: NDArray[np.int32],
+    number: Int32Array,
 ) -> None:
-    """Write the walls that `count_walls` counted."""
-    place, ref = balls.place, balls.reference
-    for i in range(len(start) - 1):
-        _search_walls(place, ref, walls, skin, horizon, i, partner, start[i])
+    nowhere = np.empty(0, np.int32)
+    for i in prange(len(number)):
+        idle = len(held) > 0 and held[i]
+        number[i] = 0 if idle else _search_walls(place, ref, walls, skin, horizon, i, nowhere, -1)
 
 
 @parallel_kernel
-def carry_memory(
-    balls: Balls,
-    new: Contacts,
-    old: Contacts,
-    old_index: IntArray,
-    modulus: float,
-    with_walls: bool,
+def _fill_walls(
+    place: FloatArray,
+    ref: RealArray,
+    walls: FloatArray,
+    skin: float,
+    horizon: float,
+    start: Int32Array,
+    partner: Int32Array,
 ) -> None:
-    """Give the contacts of a new list their stiffness and what the old list remembers of them.
-
-    Parameters
-    ----------
-    balls : Balls
-        In the new order.
-    new, old : Contacts
-    old_index : array (n,)
-        Place of each ball of the new order in the old order.
-    modulus : float [Pa]
-    with_walls : bool
-        The partners are walls.
-    """
-    for i in prange(len(new.start) - 1):
-        _carry_ball(balls, new, old, old_index, modulus, with_walls, i)
+    for i in prange(len(start) - 1):
+        if start[i] < start[i + 1]:
+            _search_walls(place, ref, walls, skin, horizon, i, partner, start[i])
 
 
-@inline_kernel
-def _carry_ball(
-    balls: Balls,
-    new: Contacts,
-    old: Contacts,
-    old_index: IntArray,
-    modulus: float,
-    with_walls: bool,
-    i: int,
-) -> None:
-    """Do the work of `carry_memory` for the contacts of ball `i`."""
-    a = old_index[i]
-    for p in range(new.start[i], new.start[i + 1]):
-        j = np.int64(new.partner[p])
-        mass = balls.motion[i, 6]
-        if with_walls:
-            kn = wall_stiffness(balls.place[i, 3], modulus)
-            first, second = a, j
-        else:
-            kn = ball_stiffness(balls.place[i, 3], balls.place[j, 3], modulus)
-            mass = mass * balls.motion[j, 6] / (mass + balls.motion[j, 6])
-            first, second = min(a, old_index[j]), max(a, old_index[j])
-        for word in range(ROW - 2):
-            new.memory[p, word] = 0.0
-        new.memory[p, 6] = kn
-        new.memory[p, 7] = 2.0 * np.sqrt(mass * kn)
-        new.touching[p] = 0
-        for q in range(old.start[first], old.start[first + 1]):
-            if old.partner[q] == second:
-                if old.touching[q]:
-                    # The memory is what the first does to the second.
-                    _copy_row(new, p, old, q, 1.0 if first == a else -1.0)
-                break
-
-
-@inline_kernel
-def _copy_row(new: Contacts, p: int, old: Contacts, q: int, sign: float) -> None:
-    new.touching[p] = 1
-    for word in range(ROW - 2):
-        new.memory[p, word] = sign * old.memory[q, word]
-    if len(old.dash) > 0:
-        for word in range(3):
-            new.dash[p, word] = sign * old.dash[q, word]
-
-
-def empty_contacts(start: IntArray, ledger: bool) -> Contacts:
-    """Make room for ``start[-1]`` contacts."""
-    count = int(start[-1])
-    return Contacts(
-        start,
-        np.empty(count, dtype=np.int32),
-        np.empty((count, ROW)),
-        np.zeros(count, dtype=np.uint8),
-        np.zeros((count if ledger else 0, 3)),
-    )
-
-
-def starts(number: IntArray) -> IntArray:
-    """Return the running total (n + 1,) of counts (n,)."""
-    start = np.zeros(len(number) + 1, dtype=np.int64)
-    np.cumsum(number, out=start[1:])
-    return start
+def list_walls(
+    place: FloatArray,
+    reference: RealArray,
+    held: NDArray[np.bool_],
+    walls: FloatArray,
+    skin: float,
+    horizon: float,
+) -> tuple[Int32Array, Int32Array]:
+    """List the walls that each ball may meet; arguments and result as in `list_pairs`."""
+    number = np.empty(len(place), dtype=np.int32)
+    _count_walls(place, reference, held, walls, skin, horizon, number)
+    start = starts(number)
+    partner = np.empty(int(start[-1]), dtype=np.int32)
+    _fill_walls(place, reference, walls, skin, horizon, start, partner)
+    return start, partner

@@ -6,13 +6,17 @@ do to a pile enters through the rolling resistance of the contact law.
 
 from __future__ import annotations
 
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int64]
+#: Lists of the engine: half the memory, and 2^31 contacts are more than a machine holds.
+Int32Array: TypeAlias = NDArray[np.int32]
+#: In the working precision of a simulation: float64 or float32.
+RealArray: TypeAlias = NDArray[np.floating[Any]]
 
 
 class Particles(NamedTuple):

@@ -14,21 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from castblast.kernel import kernel
-from castblast.muckpile.neighbours import (
-    Balls,
-    count_partners,
-    fill_partners,
-    make_grid,
-    sort_by_cell,
-    starts,
-)
+from castblast.muckpile.neighbours import list_pairs, make_grid, sort_by_cell
 from castblast.muckpile.outline import Outline
-from castblast.muckpile.particles import FloatArray, IntArray
+from castblast.muckpile.particles import FloatArray, Int32Array
 from castblast.muckpile.walls import Walls
 from castblast.progress import ProgressCallback, silent
 
 #: Over the mean radius: skin of the pair list.
 _SKIN = 0.4
+_NONE_HELD = np.empty(0, dtype=np.bool_)
 _NO_SIDES = np.empty((0, 5))
 
 
@@ -61,15 +55,14 @@ def push_apart(
     identity = np.arange(len(radius))
     sweeps, overlap = 0, np.inf
     while sweeps < most_sweeps and overlap > tolerance * mean:
-        point = np.ascontiguousarray(place[:, 0:3])
-        cell = 2.0 * float(radius.max()) + _SKIN * mean
-        grid = make_grid(point.min(axis=0), point.max(axis=0), cell, len(point))
-        order, cell_start, _ = sort_by_cell(point, grid)
+        reach = 2.0 * float(radius.max()) + _SKIN * mean
+        paths = _resting(place)
+        grid = make_grid(place[:, 0:3].min(axis=0), place[:, 0:3].max(axis=0), reach, len(place))
+        order, cell_start, slab = sort_by_cell(paths, grid)
         place, identity = place[order], identity[order]
-        shape = (_as_balls(place, identity), cell_start, grid, _SKIN * mean, 0.0)
-        start = starts(count_partners(*shape))
-        partner = np.empty(int(start[-1]), dtype=np.int32)
-        fill_partners(*shape, start, partner)
+        start, partner = list_pairs(
+            place, paths[order], _NONE_HELD, cell_start, slab, grid, _SKIN * mean, 0.0
+        )
         done, overlap = _sweep(
             place,
             start,
@@ -89,12 +82,11 @@ def push_apart(
     return back
 
 
-def _as_balls(place: FloatArray, identity: IntArray) -> Balls:
-    """Wrap resting centres for the neighbour search, which reads places and references only."""
-    count = len(place)
-    reference = np.zeros((count, 6))
-    reference[:, 0:3] = place[:, 0:3]
-    return Balls(place, np.zeros((count, 8)), np.zeros((count, 8)), reference, identity)
+def _resting(place: FloatArray) -> NDArray[np.float32]:
+    """Return the straight paths (n, 6) of balls that rest, for the search of neighbours."""
+    paths = np.zeros((len(place), 6), dtype=np.float32)
+    paths[:, 0:3] = place[:, 0:3]
+    return paths
 
 
 @kernel
@@ -130,8 +122,8 @@ def _put_inside(place: FloatArray, i: int, sides: FloatArray) -> float:
 @kernel
 def _sweep(
     place: FloatArray,
-    start: IntArray,
-    partner: NDArray[np.int32],
+    start: Int32Array,
+    partner: Int32Array,
     origin: FloatArray,
     normal: FloatArray,
     sides: FloatArray,

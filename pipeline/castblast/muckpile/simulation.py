@@ -13,29 +13,29 @@ from math import ceil, inf
 import numpy as np
 from numpy.typing import NDArray
 
+from castblast.muckpile.carry import inverse, put_aside, restore, take_rows
 from castblast.muckpile.contact import ContactLaw, damped_step_factor, law_constants
-from castblast.muckpile.dynamics import advance, first_forces
-from castblast.muckpile.neighbours import (
-    Balls,
-    Contacts,
-    carry_memory,
-    count_partners,
-    count_walls,
-    empty_contacts,
-    fill_partners,
-    fill_walls,
-    make_grid,
-    sort_by_cell,
-    starts,
+from castblast.muckpile.dynamics import advance, cut_chunks, present_forces
+from castblast.muckpile.neighbours import Grid, list_pairs, list_walls, make_grid, sort_by_cell
+from castblast.muckpile.particles import FloatArray, Int32Array, Particles, ball_mass
+from castblast.muckpile.stability import stable_step
+from castblast.muckpile.state import PRECISIONS, Balls, make_contacts
+from castblast.muckpile.survey import (
+    BallSurvey,
+    ContactSurvey,
+    first_bad_ball,
+    greatest_deviation,
+    straight_paths,
+    survey_balls,
+    survey_contacts,
 )
-from castblast.muckpile.particles import FloatArray, IntArray, Particles, ball_mass
-from castblast.muckpile.stability import stable_step, survey
+from castblast.muckpile.threads import enough_threads
 from castblast.muckpile.walls import Walls, wall_table
 
 #: Skin over mean diameter; measured as the fastest for balls in free flight and at rest.
 SKIN_RATIO = 0.15
 #: A ball may stray this far from the centre of a cast before its state counts as unstable [m].
-FARTHEST = 1e6
+FARTHEST = 1e5
 #: Overlap over radius that only an unstable step can make: a small ball caught between large ones
 #: in a cast reaches 2 with the usual soft modulus.
 DEEPEST = 20.0
@@ -64,10 +64,10 @@ class Simulation:
         0: by the rule.
     ballistic : bool
         Lists along straight paths; False: lists for balls that stay where they are.
-    threads : int
-        Number of shares of the work; the numbers do not depend on it.
     keep_ledger : bool
         Record what slip, rolling slip and dashpots dissipate.
+    precision : {"float64", "mixed"}
+        See `castblast.muckpile.state`.
     """
 
     particles: Particles
@@ -79,8 +79,8 @@ class Simulation:
     time_step: float = 0.0
     skin: float = 0.0
     ballistic: bool = True
-    threads: int = 1
     keep_ledger: bool = True
+    precision: str = "float64"
 
     clock: float = field(default=0.0, init=False)
     steps: int = field(default=0, init=False)
@@ -96,7 +96,9 @@ class Simulation:
         self._factor = self.step_safety * damped_step_factor(self.law)
         if self.skin <= 0.0:
             self.skin = SKIN_RATIO * 2.0 * float(np.mean(given.radius))
-        motion = np.zeros((count, 8))
+        self._largest_radius = float(np.max(given.radius))
+        real = PRECISIONS[self.precision]
+        motion = np.zeros((count, 8), dtype=real)
         motion[:, 0:3] = given.velocity
         motion[:, 3:6] = given.angular_velocity
         motion[:, 6] = ball_mass(given.radius, self.law.density)
@@ -105,29 +107,23 @@ class Simulation:
         self._balls = Balls(
             np.column_stack([given.position, given.radius]),
             motion,
-            np.zeros((count, 8)),
-            np.zeros((count, 6)),
-            np.arange(count),
+            np.zeros((count, 8), dtype=real),
+            np.empty((0, 6), dtype=np.float32),
+            np.arange(count, dtype=np.int32),
         )
-        self._pairs = empty_contacts(np.zeros(count + 1, dtype=np.int64), self.keep_ledger)
+        none = np.zeros(count + 1, dtype=np.int32)
+        self._pairs = make_contacts(none, none[:0], real, self.keep_ledger)
         self._touches = self._pairs
         self._slab = np.array([0, count])
-        self._part = np.array([0, 1])
+        self._chunk = np.array([0, 1])
         self._work = np.zeros((1, 3))
         self._spent = np.zeros(3)
         self._pending, self._step = -1.0, 0.0
         self._built, self._life, self._horizon = 0.0, 0.0, inf
-        self._stale = True
-        if self._renew_lists():
-            first_forces(
-                self._balls,
-                self._pairs,
-                self._touches,
-                self._walls,
-                self._law,
-                self.gravity,
-                self._work,
-            )
+        self._stale, self._step_due = True, True
+        with enough_threads(count):
+            if self._renew_lists():
+                self._evaluate()
         self._stale = True
 
     # -- results -----------------------------------------------------------------------------
@@ -138,50 +134,69 @@ class Simulation:
         return self.failed_ball >= 0
 
     @property
+    def chunks(self) -> int:
+        """Number of shares of the work that can be done side by side."""
+        return len(self._chunk) - 1
+
+    @property
     def dissipated(self) -> FloatArray:
         """Energy (3,) [J] spent by slip, rolling slip and dashpots so far."""
         return np.asarray(self._spent + self._work.sum(axis=0))
 
     def state(self) -> Particles:
         """Return a copy of the present state in the caller's order."""
-        back = np.argsort(self._balls.identity)
+        balls, count = self._balls, len(self._balls.place)
+        position, velocity, spin = (np.empty((count, 3)) for _ in range(3))
+        position[balls.identity] = balls.place[:, 0:3]
+        velocity[balls.identity] = balls.motion[:, 0:3]
+        spin[balls.identity] = balls.motion[:, 3:6]
         return Particles(
-            np.ascontiguousarray(self._balls.place[back, 0:3]),
-            np.ascontiguousarray(self._balls.motion[back, 0:3]),
-            np.ascontiguousarray(self._balls.motion[back, 3:6]),
-            self.particles.radius.copy(),
-            self.particles.block.copy(),
+            position, velocity, spin, self.particles.radius.copy(), self.particles.block.copy()
         )
 
-    def survey(self) -> tuple[float, float, int]:
-        """Elastic energy [J], largest overlap over radius, number of contacts between balls.
+    def survey_balls(self) -> BallSurvey:
+        """Energies and means of all balls."""
+        return survey_balls(self._balls)
+
+    def survey_contacts(self) -> ContactSurvey:
+        """Energy, overlaps and number of contacts.
 
         A ball that is wholly inside another or behind a wall is noted as a failure.
         """
-        found = survey(self._balls, self._pairs, self._touches, self._walls, self._law)
-        if found[1] > DEEPEST and not self.failed:
-            self.failed_ball = int(self._balls.identity[found[4]])
-        return float(found[0]), float(found[1]), int(found[3])
+        found = survey_contacts(
+            self._balls, self._pairs, self._touches, self._walls, self._slab, self._law
+        )
+        if found.largest_overlap > DEEPEST and not self.failed:
+            self.failed_ball = int(self._balls.identity[found.worst])
+        return found
 
     def mean_overlap(self) -> float:
         """Mean overlap of touching balls over the mean radius."""
-        found = survey(self._balls, self._pairs, self._touches, self._walls, self._law)
+        found = self.survey_contacts()
         mean_radius = float(np.mean(self.particles.radius))
-        return float(found[2]) / max(int(found[3]), 1) / mean_radius
+        return found.total_overlap / max(found.contacts, 1) / mean_radius
 
     def translational_energy(self) -> float:
         """Kinetic energy [J] of the motion of the centres."""
-        motion = self._balls.motion
-        return float(0.5 * np.sum(motion[:, 6] * np.sum(motion[:, 0:3] ** 2, axis=1)))
+        return self.survey_balls().translational_energy
 
     # -- actions -----------------------------------------------------------------------------
 
     def fire(self, chosen: NDArray[np.bool_], velocity: FloatArray) -> None:
-        """Release the `chosen` balls (n,) with `velocity` (n, 3) [m s-1]; spins stay."""
-        mask = chosen[self._balls.identity]
-        self._balls.motion[mask, 0:3] = velocity[self._balls.identity[mask]]
-        self._balls.motion[mask, 7] = 0.0
-        self._stale = True
+        """Release the `chosen` balls (n,) with `velocity` (n, 3) [m s-1]; spins stay.
+
+        Contacts among held balls are not listed; they appear now, with the load of their overlap.
+        """
+        balls = self._balls
+        mask = chosen[balls.identity]
+        balls.motion[mask, 0:3] = velocity[balls.identity[mask]]
+        balls.motion[mask, 7] = 0.0
+        with enough_threads(len(mask)):
+            if self._renew_lists():
+                self._evaluate()
+            else:
+                self._stale = True
+        self._step_due = True
 
     def slow(self, factor: float) -> None:
         """Multiply all velocities and spins by `factor`."""
@@ -193,12 +208,18 @@ class Simulation:
         The step is fitted to `event`, never to `until`, so that a look at the state changes
         nothing. Returns False if the state became non-finite.
         """
+        with enough_threads(len(self._balls.place)):
+            return self._run(until, event)
+
+    def _run(self, until: float, event: float) -> bool:
         while True:
             if self._pending < 0.0 and self.clock >= min(until, event):
                 return True
             if self._stale:
                 if not self._renew_lists():
                     return False
+                self._step_due = True
+            if self._step_due:
                 self._choose_step(event)
             under_way = int(self._pending >= 0.0)
             # No end in sight (an infinite event) is as good as a far one.
@@ -211,7 +232,7 @@ class Simulation:
                 self._touches,
                 self._walls,
                 self._slab,
-                self._part,
+                self._chunk,
                 self._law,
                 self.gravity,
                 goal,
@@ -230,10 +251,18 @@ class Simulation:
 
     # -- lists -------------------------------------------------------------------------------
 
+    def _evaluate(self) -> None:
+        """Forces of the state as it stands."""
+        present_forces(
+            self._balls, self._pairs, self._touches, self._walls, self._slab, self._chunk,
+            self._law, self._work,
+        )  # fmt: skip
+
     def _choose_step(self, event: float) -> None:
         rule = self._factor * stable_step(
-            self._balls, self._pairs, self._touches, self._walls, self._law
+            self._balls, self._pairs, self._touches, self._walls, self._slab, self._chunk, self._law
         )
+        self._step_due = False
         remaining = event - self.clock
         if self.time_step > 0.0:
             self._step = self.time_step
@@ -243,8 +272,6 @@ class Simulation:
             self._step = rule
         self.smallest_step = min(self.smallest_step, rule)
         self.largest_step = max(self.largest_step, rule)
-        if self.ballistic:
-            self._horizon = self._life
 
     def _next_life(self, fastest: float) -> float:
         """Choose how long [s] the next lists shall live: a little longer than the last did."""
@@ -253,61 +280,58 @@ class Simulation:
         age = self.clock - self._built
         life = min(max(1.5 * age, FIRST_LIFE * self._step), LONGEST_LIFE * self._step)
         # Longer paths need larger cells, which cost more than a renewal.
-        reach = float(np.max(self._balls.place[:, 3]))
-        return max(min(life, 0.5 * reach / max(fastest, 1e-9)), 2.0 * self._step)
+        longest = 0.5 * self._largest_radius / max(fastest, 1e-9)
+        return max(min(life, longest), 2.0 * self._step)
 
     def _renew_lists(self) -> bool:
         """Sort the balls, search their partners and carry the memory of contacts over."""
-        balls = self._balls
-        if not self._check_finite():
+        bad = first_bad_ball(self._balls, FARTHEST)
+        if bad >= 0:
+            self.failed_ball = bad
             return False
-        mean = np.mean(balls.motion[:, 0:3], axis=0)
-        fastest = float(np.sqrt(np.max(np.sum((balls.motion[:, 0:3] - mean) ** 2, axis=1))))
+        fastest = greatest_deviation(self._balls.motion)
         life = self._next_life(fastest)
-        velocity = balls.motion[:, 0:3] if life > 0.0 else np.zeros((len(balls.place), 3))
-        middle = balls.place[:, 0:3] + 0.5 * life * velocity
-        cell = 2.0 * float(np.max(balls.place[:, 3])) + self.skin + fastest * life
-        grid = make_grid(middle.min(axis=0), middle.max(axis=0), cell, len(middle))
-        order, cell_start, slab = sort_by_cell(middle, grid)
-        reference = np.column_stack([balls.place[:, 0:3], velocity])
-        self._balls = Balls(
-            balls.place[order],
-            balls.motion[order],
-            balls.force[order],
-            reference[order],
-            balls.identity[order],
+        reach = 2.0 * self._largest_radius + self.skin + fastest * life
+        order, cell_start, grid = self._sort_balls(life, reach)
+        balls, ledger = self._balls, self.keep_ledger
+        real, place_of = balls.motion.dtype, inverse(order)
+        held = balls.motion[:, 7] != 0.0
+        held = held if held.any() else held[:0]
+        near = (balls.place, balls.reference, held)
+        guess = 1.1 * len(self._pairs.partner) / len(order) + 4.0
+
+        memory = put_aside(self._touches)
+        self._touches = make_contacts(
+            *list_walls(*near, self._walls, self.skin, life), real, ledger
         )
-        shape = (self._balls, cell_start, grid, self.skin, life)
-        pairs = empty_contacts(starts(count_partners(*shape)), self.keep_ledger)
-        fill_partners(*shape, pairs.start, pairs.partner)
-        near = (self._balls, self._walls, self.skin, life)
-        touches = empty_contacts(starts(count_walls(*near)), self.keep_ledger)
-        fill_walls(*near, touches.start, touches.partner)
-        modulus = self._law.modulus
-        carry_memory(self._balls, pairs, self._pairs, order, modulus, False)
-        carry_memory(self._balls, touches, self._touches, order, modulus, True)
-        self._share_work(pairs, slab)
-        self._pairs, self._touches, self._slab = pairs, touches, slab
+        restore(self._touches, memory, order, place_of, True)
+        memory = put_aside(self._pairs)
+        # The old list goes before the new one comes.
+        self._pairs = self._touches
+        self._pairs = make_contacts(
+            *list_pairs(*near, cell_start, self._slab, grid, self.skin, life, guess), real, ledger
+        )
+        restore(self._pairs, memory, order, place_of, False)
+
+        self._chunk = cut_chunks(self._pairs.start[self._slab] + 2 * self._slab)
         self._spent += self._work.sum(axis=0)
-        self._work = np.zeros((len(slab) - 1, 3))
+        self._work = np.zeros((len(self._slab) - 1, 3))
         self._built, self._life, self._stale = self.clock, life, False
         self._horizon = life if life > 0.0 else inf
         self.rebuilds += 1
         return True
 
-    def _share_work(self, pairs: Contacts, slab: IntArray) -> None:
-        """Cut the slabs into shares of about equal work, one per thread."""
-        load = pairs.start[slab] + 3 * slab
-        targets = load[-1] * np.arange(self.threads + 1) / self.threads
-        self._part = np.searchsorted(load, targets, side="left").astype(np.int64)
-        self._part[0], self._part[-1] = 0, len(slab) - 1
-
-    def _check_finite(self) -> bool:
-        """Note the first ball, in the caller's order, whose state is no longer finite."""
+    def _sort_balls(self, life: float, reach: float) -> tuple[Int32Array, Int32Array, Grid]:
+        """Bring the balls into the order of cells, for lists of this `life` [s] and `reach` [m]."""
         balls = self._balls
-        good = np.all(np.isfinite(balls.place) & (np.abs(balls.place) < FARTHEST), axis=1)
-        good &= np.all(np.isfinite(balls.motion), axis=1)
-        if good.all():
-            return True
-        self.failed_ball = int(balls.identity[~good].min())
-        return False
+        reference, lower, upper = straight_paths(balls.place, balls.motion, life)
+        grid = make_grid(lower, upper, reach, len(balls.place))
+        order, cell_start, self._slab = sort_by_cell(reference, grid, 0.5 * life)
+        self._balls = Balls(
+            take_rows(balls.place, order),
+            take_rows(balls.motion, order),
+            take_rows(balls.force, order),
+            take_rows(reference, order),
+            balls.identity[order],
+        )
+        return order, cell_start, grid

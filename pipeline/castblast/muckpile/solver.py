@@ -25,13 +25,7 @@ from castblast.muckpile.case import (
     EnergyLedger,
     check_case,
 )
-from castblast.muckpile.particles import (
-    Particles,
-    centre_of_mass,
-    potential_energy,
-    rotational_energy,
-    translational_energy,
-)
+from castblast.muckpile.particles import Particles
 from castblast.muckpile.simulation import Simulation
 from castblast.muckpile.threads import thread_count
 from castblast.progress import ProgressCallback, silent
@@ -61,23 +55,18 @@ class _Record:
         self.largest_overlap = 0.0
         self.quiet_since = inf
 
-    def add(self, run: Simulation) -> Particles:
+    def add(self, run: Simulation) -> None:
         """Take a sample."""
-        state = run.state()
-        density = self.case.law.density
-        moving = translational_energy(state, density)
-        _, overlap, contacts = run.survey()
-        centre = centre_of_mass(state)
-        self.rows.append(
-            (run.clock, moving, rotational_energy(state, density), *map(float, centre), contacts)
-        )
+        balls, contacts = run.survey_balls(), run.survey_contacts()
+        moving = balls.translational_energy
+        centre = map(float, balls.centre_of_mass)
+        self.rows.append((run.clock, moving, balls.rotational_energy, *centre, contacts.contacts))
         self.largest_energy = max(self.largest_energy, moving)
-        self.largest_overlap = max(self.largest_overlap, overlap)
+        self.largest_overlap = max(self.largest_overlap, contacts.largest_overlap)
         if moving > self.case.stop_energy_ratio * self.largest_energy:
             self.quiet_since = inf
         elif self.quiet_since == inf:
             self.quiet_since = run.clock
-        return state
 
     def at_rest(self, last_firing: float) -> bool:
         """Whether the last sample ends a long enough time of rest."""
@@ -133,12 +122,12 @@ def run_cast(
     if faults := check_case(case):
         raise ValueError("; ".join(faults))
     began = perf_counter()
-    with thread_count(case.threads) as threads:
-        run = _make_run(case, threads)
+    with thread_count(case.threads):
+        run = _make_run(case)
         return _run_to_rest(case, run, progress, snapshot, began)
 
 
-def _make_run(case: CastCase, threads: int) -> Simulation:
+def _make_run(case: CastCase) -> Simulation:
     block = case.particles.block
     held = (block >= 0) & case.hold_unfired
     return Simulation(
@@ -151,8 +140,8 @@ def _make_run(case: CastCase, threads: int) -> Simulation:
         time_step=case.time_step,
         skin=case.skin,
         ballistic=case.ballistic,
-        threads=threads,
         keep_ledger=case.keep_ledger,
+        precision=case.precision,
     )
 
 
@@ -164,7 +153,7 @@ def _run_to_rest(
     began: float,
 ) -> CastResult:
     record = _Record(case)
-    state = record.add(run)
+    record.add(run)
     initial = _mechanical_energy(case, run)
     firings = np.unique(case.block_delay[case.block_delay < case.max_time])
     last_firing = float(firings[-1]) if len(firings) else 0.0
@@ -172,7 +161,7 @@ def _run_to_rest(
     next_picture = case.snapshot_interval or inf
     fired, status = 0.0, Status.NOT_CONVERGED
     if snapshot:
-        snapshot(0.0, state)
+        snapshot(0.0, run.state())
     while run.clock < case.max_time:
         if len(firings) and run.clock >= firings[0]:
             fired += _fire(case, run, float(firings[0]))
@@ -182,7 +171,7 @@ def _run_to_rest(
             status = Status.UNSTABLE_STEP
             break
         if run.clock >= next_sample:
-            state = record.add(run)
+            record.add(run)
             if run.failed:
                 status = Status.UNSTABLE_STEP
                 break
@@ -226,22 +215,25 @@ def _line(record: _Record) -> str:
 
 
 def _fire(case: CastCase, run: Simulation, time: float) -> float:
-    """Give the blocks due at `time` their velocity; return the kinetic energy added [J]."""
-    due = np.flatnonzero(case.block_delay == time)
+    """Give the blocks due at `time` their velocity; return the energy added [J].
+
+    With the velocity comes the load of contacts inside the block, which nobody asked for before.
+    """
     block = case.particles.block
-    chosen = np.isin(block, due)
-    before = run.translational_energy()
+    chosen = np.isin(block, np.flatnonzero(case.block_delay == time))
+    before = sum(_mechanical_energy(case, run))
     velocity = np.zeros((len(block), 3))
     velocity[chosen] = case.block_velocity[block[chosen]]
     run.fire(chosen, velocity)
-    return run.translational_energy() - before
+    return sum(_mechanical_energy(case, run)) - before
 
 
 def _mechanical_energy(case: CastCase, run: Simulation) -> tuple[float, float, float]:
     """Kinetic, potential and elastic energy [J] of the present state."""
-    state, density = run.state(), case.law.density
-    kinetic = translational_energy(state, density) + rotational_energy(state, density)
-    return kinetic, potential_energy(state, density, case.gravity), run.survey()[0]
+    balls = run.survey_balls()
+    kinetic = balls.translational_energy + balls.rotational_energy
+    potential = balls.mass * case.gravity * float(balls.centre_of_mass[2])
+    return kinetic, potential, run.survey_contacts().energy
 
 
 def _close_ledger(

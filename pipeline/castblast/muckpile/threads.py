@@ -13,6 +13,9 @@ import numba
 # first parallel kernel starts; whoever sets it outside is obeyed.
 os.environ.setdefault("GOMP_SPINCOUNT", "2000")
 
+#: A step of this many balls takes about as long as waking a thread on a busy machine.
+BALLS_PER_THREAD = 2000
+
 
 @contextmanager
 def thread_count(threads: int) -> Iterator[int]:
@@ -25,3 +28,10 @@ def thread_count(threads: int) -> Iterator[int]:
         yield number
     finally:
         numba.set_num_threads(before)
+
+
+@contextmanager
+def enough_threads(balls: int) -> Iterator[int]:
+    """Use no more threads than `balls` give work to; waking the others costs more than it saves."""
+    with thread_count(max(1, min(numba.get_num_threads(), balls // BALLS_PER_THREAD))) as number:
+        yield number

@@ -1,0 +1,88 @@
+"""What the engine works on: balls in the order of their cells, and their candidate contacts.
+
+In mixed precision, motion, forces and contact memory are stored in single precision: a contact
+then takes half a cache line and a ball 124 bytes instead of 188. Positions stay in double
+precision (a float32 at 100 m resolves 8e-6 m, a good part of the overlap of a ball at rest), and
+all arithmetic is double.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from castblast.muckpile.contact import ROW
+from castblast.muckpile.particles import FloatArray, Int32Array, RealArray
+
+#: Working precisions and the type of what they store beside positions.
+PRECISIONS: dict[str, DTypeLike] = {"float64": np.float64, "mixed": np.float32}
+
+
+class Balls(NamedTuple):
+    """State of the balls in the order of their cells, one cache line or less per row.
+
+    Attributes
+    ----------
+    place : array (n, 4), float64 [m]
+        Centre and radius.
+    motion : array (n, 8), real
+        Velocity [m s-1], spin [rad s-1], mass [kg], and 1.0 where the ball is held in place.
+    force : array (n, 8), real
+        Force [N], moment [N m], two unused words. Meaningless where the ball is held.
+    reference : array (n, 6), float32
+        Centre and velocity when the list was built: a straight path. Search and test use this
+        same path, so that its rounding costs no contact.
+    identity : array (n,), int32
+        Index of the ball in the caller's arrays.
+    """
+
+    place: FloatArray
+    motion: RealArray
+    force: RealArray
+    reference: NDArray[np.float32]
+    identity: Int32Array
+
+
+class Contacts(NamedTuple):
+    """Candidate contacts, those of ball i in ``start[i]:start[i + 1]``, with their memory.
+
+    Attributes
+    ----------
+    start : array (n + 1,), int32
+    partner : array (p,), int32
+        Index of the second ball (always larger), or of the wall.
+    memory : array (p, 8), real
+        See `castblast.muckpile.contact`; meaningless until the contact closes.
+    touching : array (p,), uint8
+    dash : array (p, 3) or (0, 3), real [N]
+        Dashpot force of the last step; empty when no ledger is kept.
+    """
+
+    start: Int32Array
+    partner: Int32Array
+    memory: RealArray
+    touching: NDArray[np.uint8]
+    dash: RealArray
+
+
+def make_contacts(
+    start: Int32Array, partner: Int32Array, real: DTypeLike, ledger: bool
+) -> Contacts:
+    """Make room for contacts that do not touch yet."""
+    count = len(partner)
+    return Contacts(
+        start,
+        partner,
+        np.empty((count, ROW), dtype=real),
+        np.zeros(count, dtype=np.uint8),
+        np.empty((count if ledger else 0, 3), dtype=real),
+    )
+
+
+def starts(number: NDArray[np.int32]) -> Int32Array:
+    """Return the running total (n + 1,) of counts (n,)."""
+    start = np.zeros(len(number) + 1, dtype=np.int32)
+    np.cumsum(number, out=start[1:])
+    return start

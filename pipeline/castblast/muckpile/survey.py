@@ -1,0 +1,246 @@
+"""Looks at a running simulation: energies of balls and contacts, how fast and how far balls go.
+
+Sums are formed slab by slab, or in a fixed number of pieces, and do not depend on threads.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numba import prange
+from numpy.typing import NDArray
+
+from castblast.kernel import lean_kernel, parallel_kernel
+from castblast.muckpile.contact import Constants, spring_energy
+from castblast.muckpile.neighbours import PIECES
+from castblast.muckpile.particles import FloatArray, IntArray, RealArray
+from castblast.muckpile.state import Balls, Contacts
+from castblast.muckpile.walls import wall_distance
+
+
+class BallSurvey(NamedTuple):
+    """The balls at one moment.
+
+    Attributes
+    ----------
+    mass : float [kg]
+    translational_energy, rotational_energy : float [J]
+    centre_of_mass : array (3,) [m]
+    """
+
+    mass: float
+    translational_energy: float
+    rotational_energy: float
+    centre_of_mass: FloatArray
+
+
+def survey_balls(balls: Balls) -> BallSurvey:
+    """Energies and means of all balls."""
+    sums = _sum_balls(balls).sum(axis=0)
+    mass, translation, rotation = map(float, sums[0:3])
+    return BallSurvey(mass, 0.5 * translation, 0.5 * rotation, sums[3:6] / mass)
+
+
+@parallel_kernel
+def _sum_balls(balls: Balls) -> FloatArray:
+    count = len(balls.place)
+    sums = np.zeros((PIECES, 6))
+    for piece in prange(PIECES):
+        _sum_piece(
+            balls.place, balls.motion,
+            piece * count // PIECES, (piece + 1) * count // PIECES, sums, piece,
+        )  # fmt: skip
+    return sums
+
+
+@lean_kernel
+def _sum_piece(
+    place: FloatArray, motion: RealArray, first: int, last: int, sums: FloatArray, piece: int
+) -> None:
+    for i in range(first, last):
+        mass = float(motion[i, 6])
+        speed, spin = 0.0, 0.0
+        for axis in range(3):
+            speed += float(motion[i, axis]) ** 2
+            spin += float(motion[i, axis + 3]) ** 2
+            sums[piece, 3 + axis] += mass * place[i, axis]
+        sums[piece, 0] += mass
+        sums[piece, 1] += mass * speed
+        sums[piece, 2] += 0.4 * mass * place[i, 3] * place[i, 3] * spin
+
+
+@parallel_kernel
+def first_bad_ball(balls: Balls, farthest: float) -> int:
+    """Return the least identity of a ball with a state not finite or beyond `farthest` [m]; -1."""
+    place, motion, identity = balls.place, balls.motion, balls.identity
+    count = len(place)
+    bad = np.full(PIECES, count)
+    for piece in prange(PIECES):
+        for i in range(piece * count // PIECES, (piece + 1) * count // PIECES):
+            far = abs(place[i, 0]) + abs(place[i, 1]) + abs(place[i, 2])
+            fast = 0.0
+            for axis in range(6):
+                fast += abs(motion[i, axis])
+            # Asked in this way, what is not a number fails.
+            if not (far < farthest and fast < np.inf):
+                bad[piece] = min(bad[piece], identity[i])
+    least = bad.min()
+    return least if least < count else -1
+
+
+@parallel_kernel
+def greatest_deviation(motion: RealArray) -> float:
+    """Greatest speed [m s-1] of a ball relative to the middle of the box of all velocities."""
+    count = len(motion)
+    lower, upper = np.full((PIECES, 3), np.inf), np.full((PIECES, 3), -np.inf)
+    for piece in prange(PIECES):
+        for i in range(piece * count // PIECES, (piece + 1) * count // PIECES):
+            for axis in range(3):
+                lower[piece, axis] = min(lower[piece, axis], motion[i, axis])
+                upper[piece, axis] = max(upper[piece, axis], motion[i, axis])
+    middle = np.empty(3)
+    for axis in range(3):
+        middle[axis] = 0.5 * (lower[:, axis].min() + upper[:, axis].max())
+    most = np.zeros(PIECES)
+    for piece in prange(PIECES):
+        for i in range(piece * count // PIECES, (piece + 1) * count // PIECES):
+            square = 0.0
+            for axis in range(3):
+                square += (motion[i, axis] - middle[axis]) ** 2
+            most[piece] = max(most[piece], square)
+    return sqrt(most.max())
+
+
+@parallel_kernel
+def straight_paths(
+    place: FloatArray, motion: RealArray, life: float
+) -> tuple[NDArray[np.float32], FloatArray, FloatArray]:
+    """Reference paths (n, 6), and the box of their middles; resting if `life` [s] is 0."""
+    count = len(place)
+    reference = np.empty((count, 6), np.float32)
+    lower, upper = np.full((PIECES, 3), np.inf), np.full((PIECES, 3), -np.inf)
+    moving = 1.0 if life > 0.0 else 0.0
+    for piece in prange(PIECES):
+        for i in range(piece * count // PIECES, (piece + 1) * count // PIECES):
+            for axis in range(3):
+                reference[i, axis] = place[i, axis]
+                reference[i, axis + 3] = moving * motion[i, axis]
+                middle = place[i, axis] + 0.5 * life * motion[i, axis]
+                lower[piece, axis] = min(lower[piece, axis], middle)
+                upper[piece, axis] = max(upper[piece, axis], middle)
+    low, high = lower[0].copy(), upper[0].copy()
+    for piece in range(1, PIECES):
+        for axis in range(3):
+            low[axis] = min(low[axis], lower[piece, axis])
+            high[axis] = max(high[axis], upper[piece, axis])
+    return reference, low, high
+
+
+class ContactSurvey(NamedTuple):
+    """All contacts at one moment.
+
+    Attributes
+    ----------
+    energy : float [J]
+        In the springs.
+    largest_overlap : float [-]
+        Over the radius of the smaller ball.
+    total_overlap : float [m]
+        Of balls with balls.
+    contacts : int
+        Of balls with balls.
+    worst : int
+        Ball, in the order of cells, of the largest overlap.
+    """
+
+    energy: float
+    largest_overlap: float
+    total_overlap: float
+    contacts: int
+    worst: int
+
+
+def survey_contacts(
+    balls: Balls,
+    pairs: Contacts,
+    touches: Contacts,
+    walls: FloatArray,
+    slab: IntArray,
+    law: Constants,
+) -> ContactSurvey:
+    """Energy, overlaps and number of contacts."""
+    rows = np.zeros((len(slab) - 1, 5))
+    _survey_slabs(balls, pairs, touches, walls, slab, law, rows)
+    deepest = int(np.argmax(rows[:, 1]))
+    energy, _, total, contacts, _ = rows.sum(axis=0)
+    return ContactSurvey(
+        float(energy), float(rows[deepest, 1]), float(total), int(contacts), int(rows[deepest, 4])
+    )
+
+
+@parallel_kernel
+def _survey_slabs(
+    balls: Balls,
+    pairs: Contacts,
+    touches: Contacts,
+    walls: FloatArray,
+    slab: IntArray,
+    law: Constants,
+    rows: FloatArray,
+) -> None:
+    for s in prange(len(rows)):
+        _survey_pairs(balls, pairs, slab[s], slab[s + 1], law, rows, s)
+        _survey_walls(balls, touches, walls, slab[s], slab[s + 1], law, rows, s)
+
+
+@lean_kernel
+def _survey_pairs(
+    balls: Balls, pairs: Contacts, first: int, last: int, law: Constants, rows: FloatArray, s: int
+) -> None:
+    place, start, partner = balls.place, pairs.start, pairs.partner
+    touching, memory = pairs.touching, pairs.memory
+    for i in range(first, last):
+        radius = place[i, 3]
+        for p in range(start[i], start[i + 1]):
+            if touching[p]:
+                j = partner[p]
+                square = 0.0
+                for axis in range(3):
+                    square += (place[j, axis] - place[i, axis]) ** 2
+                radii = radius + place[j, 3]
+                overlap = radii - sqrt(square)
+                effective = radius * place[j, 3] / radii
+                rows[s, 0] += spring_energy(memory, p, overlap, effective, law.shear_ratio)
+                share = overlap / min(radius, place[j, 3])
+                if share > rows[s, 1]:
+                    rows[s, 1], rows[s, 4] = share, i
+                rows[s, 2] += overlap
+                rows[s, 3] += 1.0
+
+
+@lean_kernel
+def _survey_walls(
+    balls: Balls,
+    touches: Contacts,
+    walls: FloatArray,
+    first: int,
+    last: int,
+    law: Constants,
+    rows: FloatArray,
+    s: int,
+) -> None:
+    place, start, partner = balls.place, touches.start, touches.partner
+    touching, memory = touches.touching, touches.memory
+    for i in range(first, last):
+        radius = place[i, 3]
+        for p in range(start[i], start[i + 1]):
+            if touching[p]:
+                distance, _ = wall_distance(
+                    walls, partner[p], place[i, 0], place[i, 1], place[i, 2], radius
+                )
+                overlap = radius - distance
+                rows[s, 0] += spring_energy(memory, p, overlap, radius, law.shear_ratio)
+                if overlap > rows[s, 1] * radius:
+                    rows[s, 1], rows[s, 4] = overlap / radius, i
