@@ -42,6 +42,8 @@ CHECKS = (
 )
 _THREADS = "threads of one process"
 _PROCESSES = 2
+#: Load before the start above which the figures are not to be trusted.
+_BUSY = 1.5
 _UNITS = ((86_400.0, "d"), (3600.0, "h"), (60.0, "min"), (1.0, "s"))
 
 
@@ -133,6 +135,8 @@ def costs_table(measured: Measured, load: float) -> list[str]:
     ]
     head = ["| part | cost | of |", "|---|---:|---|"]
     note = f"Taken on {os.cpu_count()} cores with a load of {load:.1f} at the start."
+    if load > _BUSY:
+        note += " **The machine was busy: costs and errors of the check are too large.**"
     return [*head, *(f"| {' | '.join(cells)} |" for cells in rows), "", note]
 
 
