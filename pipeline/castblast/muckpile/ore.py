@@ -34,6 +34,7 @@ from numpy.typing import NDArray
 
 from castblast.muckpile.movement import GroupMovement, group_movement
 from castblast.muckpile.particles import FloatArray, IntArray, Particles, ball_mass
+from castblast.muckpile.profile import mass_quantile
 
 METHODS = ("as_planned", "translated", "outlined", "dig_blocks")
 WASTE = -1
@@ -205,8 +206,9 @@ def _inside(area: Area, position: FloatArray) -> NDArray[np.bool_]:
 def densest_area(position: FloatArray, radius: FloatArray, share: float, cell: float) -> Area:
     """Smallest area in plan that holds a share of the mass of balls.
 
-    Mass per area is counted on a square grid and smoothed by a Gaussian of one cell (SciPy); the
-    contour (contourpy) is that above which the stated share lies. Where the density is even, as
+    Mass per area is counted on a square grid and smoothed by a Gaussian of one cell (SciPy). The
+    contour (contourpy) is at the density that the stated share of the mass exceeds where it lies
+    (Hyndman 1996). Where the density is even, as
     in an undisturbed bench, any part of it would do, and the smoothing chooses the inner one.
 
     Parameters
@@ -222,19 +224,20 @@ def densest_area(position: FloatArray, radius: FloatArray, share: float, cell: f
     if not len(radius):
         return []
     from contourpy import FillType, contour_generator
-    from scipy.ndimage import gaussian_filter
+    from scipy.ndimage import gaussian_filter, map_coordinates
 
     low = np.floor(position[:, :2].min(axis=0) / cell) - 5.0
     size = (np.floor(position[:, :2].max(axis=0) / cell) + 6.0 - low).astype(int)
     at = np.floor(position[:, :2] / cell - low).astype(np.int64)
     weight = np.bincount(at[:, 1] * size[0] + at[:, 0], radius**3, minlength=int(size.prod()))
     density = gaussian_filter(weight.reshape(size[1], size[0]), 1.0, mode="constant")
-    falling = np.sort(density, axis=None)[::-1]
-    reached = np.cumsum(falling)
-    level = falling[int(np.searchsorted(reached, share * reached[-1]))]
+    place = position[:, 1::-1] / cell - low[::-1] - 0.5
+    level = mass_quantile(
+        map_coordinates(density, place.T, order=1, mode="nearest"), radius, 1.0 - share
+    )
     x, y = ((low[axis] + 0.5 + np.arange(size[axis])) * cell for axis in (0, 1))
     contours = contour_generator(x, y, density, fill_type=FillType.OuterOffset)
-    filled: Any = contours.filled(level, 2.0 * falling[0])
+    filled: Any = contours.filled(level, 2.0 * density.max())
     rings = [
         [np.asarray(part[a:b]) for a, b in pairwise(ends)]
         for part, ends in zip(*filled, strict=True)
