@@ -35,13 +35,16 @@ def packing():
 def test_packing_has_the_fraction_asked_for(packing):
     """0.60 inside, to 0.01; the number of balls is as estimated.
 
-    Overlaps are a few per cent of the radius, as the weight on a modulus of 1e7 Pa asks for.
+    Overlaps are a few per cent of the radius, as the weight on a modulus of 1e7 Pa asks for. Forces
+    in a packing are exponentially distributed with a decay of about 1.5 over the mean (Radjai et
+    al. 1996): the largest of 5,000 is 5.7 times it, the largest overlap below 0.15 for a mean of
+    0.01 and contacts of small balls up to twice as soft.
     """
     assert packing.status == Status.OK
     assert len(packing.particles.radius) == estimate_count(BENCH, MEAN_RADIUS) == 2000
     assert packing.solid_fraction == pytest.approx(0.60, abs=0.01)
     assert packing.mean_overlap < 0.03
-    assert check_particles(packing.particles) == []
+    assert check_particles(packing.particles, 0.15) == []
 
 
 def test_packing_lies_inside_the_bench(packing):
