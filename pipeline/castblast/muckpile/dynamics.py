@@ -21,6 +21,7 @@ from castblast.muckpile.contact import Constants
 from castblast.muckpile.forces import pair_forces, wall_forces
 from castblast.muckpile.particles import FloatArray, IntArray, RealArray
 from castblast.muckpile.state import Balls, Contacts
+from castblast.muckpile.walls import WallTable
 
 #: Most sweeps that run side by side; more threads than that have nothing to do.
 MOST_CHUNKS = 32
@@ -113,7 +114,7 @@ def _do_pairs(
 def _do_balls(
     balls: Balls,
     touches: Contacts,
-    walls: FloatArray,
+    walls: WallTable,
     first: int,
     last: int,
     law: Constants,
@@ -162,7 +163,7 @@ def _sweep(
     balls: Balls,
     pairs: Contacts,
     touches: Contacts,
-    walls: FloatArray,
+    walls: WallTable,
     slab: IntArray,
     first: int,
     last: int,
@@ -192,7 +193,7 @@ def advance(
     balls: Balls,
     pairs: Contacts,
     touches: Contacts,
-    walls: FloatArray,
+    walls: WallTable,
     slab: IntArray,
     chunk: IntArray,
     law: Constants,
@@ -214,8 +215,7 @@ def advance(
         In the order of their cells; changed in place, as the contacts.
     pairs, touches : Contacts
         Ball with ball, ball with wall.
-    walls : array (w, 20)
-        See `castblast.muckpile.walls.wall_table`.
+    walls : WallTable
     slab : array (s + 1,)
         First ball of each slab.
     chunk : array (c + 1,)
@@ -276,7 +276,7 @@ def present_forces(
     balls: Balls,
     pairs: Contacts,
     touches: Contacts,
-    walls: FloatArray,
+    walls: WallTable,
     slab: IntArray,
     chunk: IntArray,
     law: Constants,

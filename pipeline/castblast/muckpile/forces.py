@@ -20,8 +20,9 @@ from castblast.muckpile.contact import (
     open_contact,
     wall_stiffness,
 )
+from castblast.muckpile.facets import hand_over
 from castblast.muckpile.particles import FloatArray, RealArray
-from castblast.muckpile.walls import FRICTION, ROLLING_FRICTION, wall_distance
+from castblast.muckpile.walls import WallTable, wall_distance, wall_friction
 
 
 @inline_kernel
@@ -127,7 +128,7 @@ def wall_forces(
     dash: RealArray,
     first: int,
     last: int,
-    walls: FloatArray,
+    walls: WallTable,
     i: int,
     law: Constants,
     step: float,
@@ -136,6 +137,8 @@ def wall_forces(
 ) -> None:
     """Add the forces of the wall contacts first .. last - 1 of ball `i`."""
     radius = place[i, 3]
+    if len(walls.facet) > 0:
+        hand_over(walls, place, partner, memory, touching, dash, first, last, i)
     for p in range(first, last):
         k = partner[p]
         distance, (nx, ny, nz) = wall_distance(
@@ -159,13 +162,14 @@ def wall_forces(
             touching[p] = 1
             stiffness = wall_stiffness(radius, law.modulus)
             close_contact(memory, dash, p, stiffness, motion[i, 6])
+        friction, rolling_friction = wall_friction(walls, k)
         (px, py, pz), (mx, my, mz) = contact_force(
             memory,
             dash,
             p,
             law,
-            walls[k, FRICTION],
-            walls[k, ROLLING_FRICTION],
+            friction,
+            rolling_friction,
             (nx, ny, nz),
             overlap,
             radius,

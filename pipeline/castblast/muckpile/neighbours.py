@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from castblast.kernel import inline_kernel, lean_kernel, parallel_kernel
 from castblast.muckpile.particles import FloatArray, Int32Array, IntArray, RealArray
 from castblast.muckpile.state import starts
-from castblast.muckpile.walls import wall_distance
+from castblast.muckpile.walls import WallTable, near_walls
 
 #: Pieces into which passes over all balls are cut; fixed, so that sums do not depend on threads.
 PIECES = 32
@@ -321,7 +321,7 @@ def list_pairs(
 def _search_walls(
     place: FloatArray,
     ref: RealArray,
-    walls: FloatArray,
+    walls: WallTable,
     skin: float,
     horizon: float,
     i: int,
@@ -337,14 +337,7 @@ def _search_walls(
     )
     speed = np.sqrt(float(ref[i, 3] ** 2 + ref[i, 4] ** 2 + ref[i, 5] ** 2))
     reach = place[i, 3] + 0.5 * skin + half * speed
-    count = 0
-    for k in range(len(walls)):
-        distance, _ = wall_distance(walls, k, x, y, z, reach)
-        if distance < reach:
-            if at >= 0:
-                found[at + count] = k
-            count += 1
-    return count
+    return near_walls(walls, x, y, z, reach, found, at)
 
 
 @parallel_kernel
@@ -352,7 +345,7 @@ def _count_walls(
     place: FloatArray,
     ref: RealArray,
     held: NDArray[np.bool_],
-    walls: FloatArray,
+    walls: WallTable,
     skin: float,
     horizon: float,
     number: Int32Array,
@@ -367,7 +360,7 @@ def _count_walls(
 def _fill_walls(
     place: FloatArray,
     ref: RealArray,
-    walls: FloatArray,
+    walls: WallTable,
     skin: float,
     horizon: float,
     start: Int32Array,
@@ -382,7 +375,7 @@ def list_walls(
     place: FloatArray,
     reference: RealArray,
     held: NDArray[np.bool_],
-    walls: FloatArray,
+    walls: WallTable,
     skin: float,
     horizon: float,
 ) -> tuple[Int32Array, Int32Array]:

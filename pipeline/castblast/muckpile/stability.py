@@ -14,9 +14,9 @@ from numba import prange
 
 from castblast.kernel import inline_kernel, lean_kernel, parallel_kernel
 from castblast.muckpile.contact import Constants, wall_stiffness
-from castblast.muckpile.particles import FloatArray, IntArray, RealArray
+from castblast.muckpile.particles import IntArray, RealArray
 from castblast.muckpile.state import Balls, Contacts
-from castblast.muckpile.walls import wall_distance
+from castblast.muckpile.walls import WallTable, wall_distance
 
 
 @parallel_kernel
@@ -24,7 +24,7 @@ def stable_step(
     balls: Balls,
     pairs: Contacts,
     touches: Contacts,
-    walls: FloatArray,
+    walls: WallTable,
     slab: IntArray,
     chunk: IntArray,
     law: Constants,
@@ -80,7 +80,7 @@ def _add_pairs(
 def _least_of_balls(
     balls: Balls,
     touches: Contacts,
-    walls: FloatArray,
+    walls: WallTable,
     law: Constants,
     first: int,
     last: int,

@@ -17,7 +17,7 @@ from castblast.muckpile.contact import Constants, spring_energy
 from castblast.muckpile.neighbours import PIECES
 from castblast.muckpile.particles import FloatArray, IntArray, RealArray
 from castblast.muckpile.state import Balls, Contacts
-from castblast.muckpile.walls import wall_distance
+from castblast.muckpile.walls import WallTable, wall_distance
 
 
 class BallSurvey(NamedTuple):
@@ -166,7 +166,7 @@ def survey_contacts(
     balls: Balls,
     pairs: Contacts,
     touches: Contacts,
-    walls: FloatArray,
+    walls: WallTable,
     slab: IntArray,
     law: Constants,
 ) -> ContactSurvey:
@@ -185,7 +185,7 @@ def _survey_slabs(
     balls: Balls,
     pairs: Contacts,
     touches: Contacts,
-    walls: FloatArray,
+    walls: WallTable,
     slab: IntArray,
     law: Constants,
     rows: FloatArray,
@@ -224,7 +224,7 @@ def _survey_pairs(
 def _survey_walls(
     balls: Balls,
     touches: Contacts,
-    walls: FloatArray,
+    walls: WallTable,
     first: int,
     last: int,
     law: Constants,

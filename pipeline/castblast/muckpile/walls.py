@@ -1,10 +1,10 @@
-"""Rigid walls that do not move: planes and rectangles of any extent.
+"""Rigid walls that do not move: planes, rectangles of any extent, and triangulated surfaces.
 
 A wall is a rectangle, possibly without end on any side, that a ball may touch on the side of its
 normal. A plane is a rectangle without ends: it holds a ball however deep it is pressed in. At the
 rim of a bounded wall the ball touches the nearest point of the rim, so that it rolls over an edge
-smoothly; where two walls meet in a convex edge only one of them needs the rim. Left out: moving
-walls and triangulated terrain.
+smoothly; where two walls meet in a convex edge only one of them needs the rim. Facets that share
+corners are one surface, see `castblast.muckpile.facets`. Left out: moving walls.
 """
 
 from __future__ import annotations
@@ -18,11 +18,41 @@ from numpy.typing import ArrayLike, NDArray
 from castblast.kernel import inline_kernel
 from castblast.muckpile.bench import Bench
 from castblast.muckpile.contact import Vector
+from castblast.muckpile.facet_table import make_table
+from castblast.muckpile.facets import (
+    FACET_FRICTION,
+    FACET_ROLLING,
+    WallTable,
+    facet_distance,
+    facet_height,
+    near_facets,
+)
 from castblast.muckpile.particles import FloatArray
+
+__all__ = [
+    "WallTable",
+    "Walls",
+    "bench_walls",
+    "floor",
+    "ground_height",
+    "join",
+    "near_walls",
+    "plane",
+    "rectangle",
+    "slope",
+    "surface",
+    "wall_distance",
+    "wall_friction",
+    "wall_table",
+]
+
+#: How many radii behind a surface of facets a ball is still held: less than the thickness of any
+#: body over the radius, or the far side would pull it through.
+SHEET_DEPTH = 0.5
 
 
 class Walls(NamedTuple):
-    """All walls of a case; row k of every array is wall k.
+    """All walls of a case: w planes and rectangles, and t facets.
 
     Attributes
     ----------
@@ -35,6 +65,14 @@ class Walls(NamedTuple):
         NaN: that of the contact law.
     rim : array (w,), bool
         Whether the rim of a bounded wall can be touched.
+    corner : array (t, 3, 3) [m]
+        Corners of each facet, counter-clockwise seen from the side of the balls.
+    facet_friction, facet_rolling_friction : array (t,)
+        NaN: that of the contact law.
+    facet_depth : array (t,)
+        How many radii behind the surface a ball is still held.
+    facet_base : array (t,) [m]
+        Rims of a surface that lie no higher than this cannot be touched.
     """
 
     origin: FloatArray
@@ -45,6 +83,11 @@ class Walls(NamedTuple):
     friction: FloatArray
     rolling_friction: FloatArray
     rim: NDArray[np.bool_]
+    corner: FloatArray = np.zeros((0, 3, 3))
+    facet_friction: FloatArray = np.zeros(0)
+    facet_rolling_friction: FloatArray = np.zeros(0)
+    facet_depth: FloatArray = np.zeros(0)
+    facet_base: FloatArray = np.zeros(0)
 
 
 def rectangle(
@@ -110,6 +153,45 @@ def floor(height: float = 0.0) -> Walls:
     return plane((0.0, 0.0, height), (0.0, 0.0, 1.0))
 
 
+def surface(
+    corner: ArrayLike, friction: float = nan, *, depth: float = SHEET_DEPTH, base: float = -inf
+) -> Walls:
+    """Facets of one surface.
+
+    Parameters
+    ----------
+    corner : array_like (t, 3, 3) [m]
+        Corners of each facet, counter-clockwise seen from the side of the balls.
+        `castblast.muckpile.terrain.surface_faults` tells whether they can be used.
+    friction : float
+        Used for sliding and for rolling; NaN: that of the contact law.
+    depth : float [-]
+        How many radii behind the surface a ball is still held.
+    base : float [m]
+        Rims of the surface that lie no higher than this cannot be touched: a surface that ends on
+        a floor at this height goes over into it.
+    """
+    corners = np.array(corner, dtype=np.float64).reshape(-1, 3, 3)
+    count = len(corners)
+    share = np.full(count, friction)
+    none = np.zeros((0, 3))
+    return Walls(
+        none,
+        none,
+        none,
+        none,
+        np.zeros((0, 4)),
+        np.zeros(0),
+        np.zeros(0),
+        np.zeros(0, dtype=np.bool_),
+        corners,
+        share,
+        share.copy(),
+        np.full(count, depth),
+        np.full(count, base),
+    )
+
+
 def slope(toe_x: float, angle: float, length: float = inf) -> Walls:
     """Return a plane that rises with x from its toe on the floor.
 
@@ -120,9 +202,14 @@ def slope(toe_x: float, angle: float, length: float = inf) -> Walls:
         Over the horizontal; 30 degrees in the published case.
     length : float [m]
         Along the slope.
+
+    Notes
+    -----
+    It goes on below the floor, where no ball can be, so that the floor before it is free of the
+    rim that it would have there.
     """
     rise = (np.cos(angle), 0.0, np.sin(angle))
-    return rectangle((toe_x, 0.0, 0.0), rise, (0.0, 1.0, 0.0), (0.0, length, -inf, inf))
+    return rectangle((toe_x, 0.0, 0.0), rise, (0.0, 1.0, 0.0), (-inf, length, -inf, inf))
 
 
 def join(*walls: Walls) -> Walls:
@@ -205,49 +292,100 @@ def ground_height(walls: Walls, x: FloatArray, y: FloatArray) -> FloatArray:
         over = (along[0] >= low1) & (along[0] <= high1)
         over &= (along[1] >= low2) & (along[1] <= high2)
         height = np.where(over, np.maximum(height, rz + origin[2]), height)
-    return np.asarray(height)
+    height = np.array(height, dtype=np.float64)
+    if len(walls.corner):
+        table = wall_table(walls, 0.0, 0.0)
+        flat = [np.ascontiguousarray(np.broadcast_to(v, height.shape), float) for v in (x, y)]
+        facet_height(table, flat[0].ravel(), flat[1].ravel(), height.reshape(-1))
+    return height
 
 
-#: Columns of a wall table: origin, both axes and normal (3 each), bounds (4), and these.
-FRICTION, ROLLING_FRICTION, _RIM, _ENDLESS = 16, 17, 18, 19
+#: Last columns of `WallTable.plane`.
+_FRICTION, _ROLLING, _RIM, _ENDLESS = 16, 17, 18, 19
 
 
-def wall_table(walls: Walls, friction: float, rolling_friction: float) -> FloatArray:
-    """Return `walls` as kernels read them, a row of 20 words per wall.
+def wall_table(walls: Walls, friction: float, rolling_friction: float) -> WallTable:
+    """Return `walls` as kernels read them; the friction of the law takes the place of none."""
 
-    The friction of the law takes the place of none. One array instead of eight keeps the inner
-    loops free of the bookkeeping that Numba does for each array it takes out of a tuple.
-    """
-    own = np.where(np.isnan(walls.friction), friction, walls.friction)
-    own_rolling = np.where(
-        np.isnan(walls.rolling_friction), rolling_friction, walls.rolling_friction
+    def own(values: FloatArray, law: float) -> FloatArray:
+        return np.where(np.isnan(values), law, values)
+
+    plane = [
+        walls.origin,
+        walls.axis1,
+        walls.axis2,
+        walls.normal,
+        walls.bounds,
+        own(walls.friction, friction),
+        own(walls.rolling_friction, rolling_friction),
+        walls.rim,
+        np.all(np.isinf(walls.bounds), axis=1),
+    ]
+    return make_table(
+        np.column_stack(plane).astype(np.float64),
+        walls.corner,
+        own(walls.facet_friction, friction),
+        own(walls.facet_rolling_friction, rolling_friction),
+        walls.facet_depth,
+        walls.facet_base,
     )
-    endless = np.all(np.isinf(walls.bounds), axis=1)
-    return np.column_stack(
-        [
-            walls.origin,
-            walls.axis1,
-            walls.axis2,
-            walls.normal,
-            walls.bounds,
-            own,
-            own_rolling,
-            walls.rim,
-            endless,
-        ]
-    ).astype(np.float64)
 
 
 @inline_kernel
 def wall_distance(
-    table: FloatArray, k: int, x: float, y: float, z: float, radius: float
+    table: WallTable, k: int, x: float, y: float, z: float, radius: float
 ) -> tuple[float, Vector]:
     """Distance [m] of a ball's centre from wall `k` and the unit vector from the wall to it.
 
+    Infinite where the ball cannot touch it. `table` is that of `wall_table`.
+    """
+    planes = len(table.plane)
+    if k < planes:
+        return _plane_distance(table.plane, k, x, y, z, radius)
+    return facet_distance(table, k - planes, x, y, z, radius)
+
+
+@inline_kernel
+def wall_friction(table: WallTable, k: int) -> tuple[float, float]:
+    """Friction and rolling friction of wall `k`."""
+    planes = len(table.plane)
+    if k < planes:
+        return table.plane[k, _FRICTION], table.plane[k, _ROLLING]
+    return table.facet[k - planes, FACET_FRICTION], table.facet[k - planes, FACET_ROLLING]
+
+
+@inline_kernel
+def near_walls(
+    table: WallTable,
+    x: float,
+    y: float,
+    z: float,
+    reach: float,
+    found: NDArray[np.int32],
+    at: int,
+) -> int:
+    """Count the walls within `reach` of a point; write them to ``found[at:]`` if at >= 0."""
+    count = 0
+    planes = len(table.plane)
+    for k in range(planes):
+        distance, _ = _plane_distance(table.plane, k, x, y, z, reach)
+        if distance < reach:
+            if at >= 0:
+                found[at + count] = k
+            count += 1
+    more = at + count if at >= 0 else -1
+    return count + near_facets(table, x, y, z, reach, found, more)
+
+
+@inline_kernel
+def _plane_distance(
+    table: FloatArray, k: int, x: float, y: float, z: float, radius: float
+) -> tuple[float, Vector]:
+    """Distance from plane or rectangle `k`, as in `wall_distance`.
+
     Over the face the distance has a sign, so that a ball pressed through a plane comes back;
     beside the face it is that to the rim. It is infinite where the ball cannot touch the wall:
-    at a rim that must not be touched, and wholly behind a wall that ends somewhere. `table` is
-    that of `wall_table`.
+    at a rim that must not be touched, and wholly behind a wall that ends somewhere.
     """
     rx, ry, rz = x - table[k, 0], y - table[k, 1], z - table[k, 2]
     s = rx * table[k, 3] + ry * table[k, 4] + rz * table[k, 5]
