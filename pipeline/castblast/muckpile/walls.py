@@ -29,14 +29,8 @@ from castblast.muckpile.facets import (
 )
 from castblast.muckpile.particles import FloatArray
 
-__all__ = [
-    "WallTable",
-    "Walls",
-    "bench_walls",
-    "floor",
-    "ground_height",
-    "join",
-    "near_walls",
+__all__ = ["WallTable", "Walls", "bench_walls", "floor", "ground_height", "join", "near_walls"]
+__all__ += [
     "plane",
     "rectangle",
     "slope",
