@@ -7,8 +7,10 @@ chooses the stable step anew at each renewal. Nothing it does depends on the num
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import ceil, inf
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +21,7 @@ from castblast.muckpile.dynamics import advance, cut_chunks, present_forces
 from castblast.muckpile.neighbours import Grid, list_pairs, list_walls, make_grid, sort_by_cell
 from castblast.muckpile.particles import FloatArray, Int32Array, Particles, ball_mass
 from castblast.muckpile.stability import stable_step
-from castblast.muckpile.state import PRECISIONS, Balls, make_contacts
+from castblast.muckpile.state import PRECISIONS, Balls, Contacts, make_contacts
 from castblast.muckpile.survey import (
     BallSurvey,
     ContactSurvey,
@@ -41,6 +43,15 @@ FARTHEST = 1e5
 DEEPEST = 20.0
 #: First and longest life of a list, in steps.
 FIRST_LIFE, LONGEST_LIFE = 16, 64
+
+#: What a run changes: numbers and arrays, and records of arrays.
+_CHANGING = (
+    "clock", "steps", "rebuilds", "failed_ball", "smallest_step", "largest_step", "_slab", "_chunk",
+    "_work", "_spent", "_pending", "_step", "_built", "_life", "_horizon", "_stale", "_step_due",
+)  # fmt: skip
+_GROUPS: dict[str, type[Balls] | type[Contacts]] = {
+    "_balls": Balls, "_pairs": Contacts, "_touches": Contacts,
+}  # fmt: skip
 
 
 @dataclass
@@ -248,6 +259,24 @@ class Simulation:
             if self.time_step <= 0.0 and begun == to_event:
                 self.clock = event
             self._stale = self._pending >= 0.0
+
+    # -- restart -----------------------------------------------------------------------------
+
+    def save(self) -> dict[str, NDArray[Any]]:
+        """Return all that changes in a run, by name."""
+        arrays = {name: np.asarray(getattr(self, name)) for name in _CHANGING}
+        for group in _GROUPS:
+            records = getattr(self, group)._asdict()
+            arrays |= {f"{group}.{name}": array for name, array in records.items()}
+        return arrays
+
+    def resume(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Go back to what `save` returned in a run of the same case."""
+        for name in _CHANGING:
+            value = arrays[name]
+            setattr(self, name, value if value.ndim else value.item())
+        for group, kind in _GROUPS.items():
+            setattr(self, group, kind(*(arrays[f"{group}.{name}"] for name in kind._fields)))
 
     # -- lists -------------------------------------------------------------------------------
 

@@ -10,7 +10,8 @@ not stop a ball that spins about its contact normal.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import inf, log, nan
+from math import floor, inf, log, nan
+from pathlib import Path
 from time import perf_counter
 from typing import TypeAlias
 
@@ -26,6 +27,7 @@ from castblast.muckpile.case import (
     check_case,
 )
 from castblast.muckpile.particles import Particles
+from castblast.muckpile.restart import Arrays, case_hash, read_restart, write_restart
 from castblast.muckpile.simulation import Simulation
 from castblast.muckpile.threads import thread_count
 from castblast.progress import ProgressCallback, silent
@@ -54,6 +56,22 @@ class _Record:
         self.largest_energy = 0.0
         self.largest_overlap = 0.0
         self.quiet_since = inf
+        self.next_sample = case.sample_interval
+        self.firings = 0
+        self.fired = 0.0
+        self.initial = (0.0, 0.0, 0.0)
+
+    def save(self) -> Arrays:
+        """Return all of it by name."""
+        kept = {name: np.asarray(value) for name, value in vars(self).items() if name != "case"}
+        return {f"record.{name}": array for name, array in kept.items()}
+
+    def resume(self, arrays: Arrays) -> None:
+        """Go back to what `save` returned."""
+        for name in vars(self).keys() - {"case"}:
+            setattr(self, name, arrays[f"record.{name}"].tolist())
+        self.rows = [tuple(row) for row in self.rows]
+        self.initial = (self.initial[0], self.initial[1], self.initial[2])
 
     def add(self, run: Simulation) -> None:
         """Take a sample."""
@@ -94,10 +112,42 @@ class _Record:
         )
 
 
+class _Keeper:
+    """Writes the restart file of a run now and then; without a path it does nothing."""
+
+    def __init__(self, case: CastCase, path: Path | None, interval: float) -> None:
+        self.path, self.interval = path, interval
+        self.key = case_hash(case) if path else ""
+        self.last = perf_counter()
+
+    def resume(self, run: Simulation, record: _Record) -> bool:
+        """Go on from the file, if there is one."""
+        if self.path is None or not self.path.exists():
+            return False
+        arrays = read_restart(self.path, self.key)
+        run.resume(arrays)
+        record.resume(arrays)
+        return True
+
+    def keep(self, run: Simulation, record: _Record) -> None:
+        """Write the file if it is time to."""
+        if self.path is None or perf_counter() - self.last < self.interval:
+            return
+        write_restart(self.path, self.key, run.save() | record.save())
+        self.last = perf_counter()
+
+    def finish(self) -> None:
+        """Remove the file: nothing is left to go on with."""
+        if self.path is not None:
+            self.path.unlink(missing_ok=True)
+
+
 def run_cast(
     case: CastCase,
     progress: ProgressCallback = silent,
     snapshot: SnapshotCallback | None = None,
+    restart: Path | None = None,
+    restart_interval: float = 300.0,
 ) -> CastResult:
     """Simulate a cast from the first firing to rest.
 
@@ -109,6 +159,11 @@ def run_cast(
     snapshot : callable, optional
         Called with the state at the start, every `snapshot_interval` and at the end. It changes
         no number of the result.
+    restart : path, optional
+        File that keeps the state of the run. If it is there, the run goes on from it, to the same
+        last bit as without interruption; it is removed when the run has ended well.
+    restart_interval : float [s]
+        Least wall time between two writings of it.
 
     Returns
     -------
@@ -118,13 +173,16 @@ def run_cast(
     ------
     ValueError
         The case contradicts itself; the message names every fault of `check_case`.
+    SpecError
+        The restart file belongs to another case or cannot be read.
     """
     if faults := check_case(case):
         raise ValueError("; ".join(faults))
     began = perf_counter()
     with thread_count(case.threads):
         run = _make_run(case)
-        return _run_to_rest(case, run, progress, snapshot, began)
+        keeper = _Keeper(case, restart, restart_interval)
+        return _run_to_rest(case, run, keeper, progress, snapshot, began)
 
 
 def _make_run(case: CastCase) -> Simulation:
@@ -148,34 +206,40 @@ def _make_run(case: CastCase) -> Simulation:
 def _run_to_rest(
     case: CastCase,
     run: Simulation,
+    keeper: _Keeper,
     progress: ProgressCallback,
     snapshot: SnapshotCallback | None,
     began: float,
 ) -> CastResult:
     record = _Record(case)
-    record.add(run)
-    initial = _mechanical_energy(case, run)
     firings = np.unique(case.block_delay[case.block_delay < case.max_time])
     last_firing = float(firings[-1]) if len(firings) else 0.0
-    next_sample = case.sample_interval
-    next_picture = case.snapshot_interval or inf
-    fired, status = 0.0, Status.NOT_CONVERGED
-    if snapshot:
-        snapshot(0.0, run.state())
+    status = Status.NOT_CONVERGED
+    if not keeper.resume(run, record):
+        record.add(run)
+        record.initial = _mechanical_energy(case, run)
+        if snapshot:
+            snapshot(0.0, run.state())
+    next_picture = inf
+    if case.snapshot_interval > 0.0:
+        next_picture = case.snapshot_interval * (1.0 + floor(run.clock / case.snapshot_interval))
+    firings = firings[record.firings :]
     while run.clock < case.max_time:
         if len(firings) and run.clock >= firings[0]:
-            fired += _fire(case, run, float(firings[0]))
+            record.fired += _fire(case, run, float(firings[0]))
+            record.firings += 1
             firings = firings[1:]
         event = min(float(firings[0]), case.max_time) if len(firings) else case.max_time
-        if run.clock < event and not run.run(min(next_sample, next_picture), event):
+        if run.clock < event and not run.run(min(record.next_sample, next_picture), event):
             status = Status.UNSTABLE_STEP
             break
-        if run.clock >= next_sample:
+        if run.clock >= record.next_sample:
             record.add(run)
             if run.failed:
                 status = Status.UNSTABLE_STEP
                 break
-            next_sample += case.sample_interval
+            record.next_sample += case.sample_interval
+            keeper.keep(run, record)
             progress(record.share(last_firing), _line(record))
             if not len(firings) and record.at_rest(last_firing):
                 status = Status.OK
@@ -187,6 +251,8 @@ def _run_to_rest(
     state = run.state()
     if snapshot and status != Status.UNSTABLE_STEP:
         snapshot(run.clock, state)
+    if status != Status.UNSTABLE_STEP:
+        keeper.finish()
     progress(1.0, _line(record))
     return CastResult(
         state,
@@ -195,7 +261,7 @@ def _run_to_rest(
         run.failed_ball,
         run.clock if run.failed else nan,
         record.history(),
-        _close_ledger(case, run, initial, fired),
+        _close_ledger(case, run, record.initial, record.fired),
         CastCounters(
             run.steps,
             run.rebuilds,

@@ -19,6 +19,16 @@ from castblast.muckpile.particles import FloatArray, Int32Array, RealArray
 #: Working precisions and the type of what they store beside positions.
 PRECISIONS: dict[str, DTypeLike] = {"float64": np.float64, "mixed": np.float32}
 
+#: Peak memory measured by this project: bytes of the interpreter with all kernels, and per ball
+#: of a dense bench (at most six pairs a ball, ledger kept, case and result counted).
+_BASE = 220e6
+_PER_BALL = {"float64": 1100.0, "mixed": 750.0}
+
+
+def estimate_memory(balls: int, precision: str = "float64") -> int:
+    """Return the memory [bytes] that a cast of so many balls needs at most, for a first check."""
+    return int(_BASE + balls * _PER_BALL[precision])
+
 
 class Balls(NamedTuple):
     """State of the balls in the order of their cells, one cache line or less per row.
