@@ -173,12 +173,15 @@ def test_balls_of_blocks_that_are_not_there(tmp_path: Path) -> None:
 
 
 def test_a_wall_that_cuts_the_balls_is_refused(tmp_path: Path) -> None:
-    """A slope whose toe lies under balls of a file; the deepest ball is named."""
+    """A slope rises through one ball of a file and over another: 0.5 - (0.5 - 3.5 tan 30) cos 30."""
     text = "x,y,z,radius\n-1,1,0.5,0.5\n3,1,0.5,0.5\n6,2,0.5,0.5\n"
     (tmp_path / "balls.csv").write_text(text)
     slope = {"distance": "2.5 m", "angle": "30 deg"}
     line = said(tmp_path, balls="balls.csv", slope=slope)
-    assert "small: wall 3 cuts 1 ball of the packing; worst: ball 1 at (3.00, 1.00, 0.50) m" in line
+    assert (
+        "small: wall 3 cuts 2 balls of the packing; worst: ball 2 at (6.00, 2.00, 0.50) m" in line
+    )
+    assert "1.8 m deep" in line
 
 
 def test_depth_in_walls() -> None:
