@@ -173,7 +173,7 @@ def test_balls_of_blocks_that_are_not_there(tmp_path: Path) -> None:
 
 
 def test_a_wall_that_cuts_the_balls_is_refused(tmp_path: Path) -> None:
-    """A slope rises through one ball of a file and over another: 0.5 - (0.5 - 3.5 tan 30) cos 30."""
+    """A slope through two balls of a file: the second is 0.5 - 0.5 cos 30 + 3.5 sin 30 deep."""
     text = "x,y,z,radius\n-1,1,0.5,0.5\n3,1,0.5,0.5\n6,2,0.5,0.5\n"
     (tmp_path / "balls.csv").write_text(text)
     slope = {"distance": "2.5 m", "angle": "30 deg"}
