@@ -166,23 +166,18 @@ def surface(
         a floor at this height goes over into it.
     """
     corners = np.array(corner, dtype=np.float64).reshape(-1, 3, 3)
-    count = len(corners)
-    share = np.full(count, friction)
+    share = np.full(len(corners), friction)
     none = np.zeros((0, 3))
     return Walls(
-        none,
-        none,
-        none,
-        none,
+        *(none, none, none, none),
         np.zeros((0, 4)),
-        np.zeros(0),
-        np.zeros(0),
+        *(np.zeros(0), np.zeros(0)),
         np.zeros(0, dtype=np.bool_),
         corners,
         share,
         share.copy(),
-        np.full(count, depth),
-        np.full(count, base),
+        np.full(len(share), depth),
+        np.full(len(share), base),
     )
 
 
