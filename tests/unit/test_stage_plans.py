@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import yaml
 from castblast.errors import SpecError
 from castblast.muckpile.initial_state import wall_faults
 from castblast.muckpile.particles import particles_at_rest
+from castblast.muckpile.state import estimate_memory
 from castblast.muckpile.walls import floor, join, plane, rectangle
 from castblast.specs.ball_files import read_balls
 from castblast.stages import muckpile_memory
@@ -108,7 +110,8 @@ def test_too_little_memory_is_said_before_packing(
     assert "small: 4,000,000 balls need about" in line
     assert "1 GiB are free" in line
     assert not (tmp_path / "out").exists()
-    assert muckpile_memory.estimate_memory(400_000) < 0.6 * 2**30
+    fitting = int(re.search(r"about ([\d,]+) balls fit", line)[1].replace(",", ""))
+    assert estimate_memory(fitting) <= 2**30 < estimate_memory(fitting + 2)
 
 
 def test_memory_of_this_machine_is_known() -> None:

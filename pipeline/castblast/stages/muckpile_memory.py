@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from castblast.errors import SpecError
+from castblast.muckpile.state import estimate_memory
 
-#: Bytes a ball takes while it is packed and thrown.
-_BYTES_PER_BALL = 1000
 _GIB = 1024.0**3
 
 
@@ -29,16 +28,13 @@ def require_memory(balls: int, name: str, available: int | None = None) -> None:
     there = available_memory() if available is None else available
     needed = estimate_memory(balls)
     if there is not None and needed > there:
+        base = estimate_memory(0)
+        fitting = max(there - base, 0) * balls // (needed - base)
         raise SpecError(
             f"{name}: {balls:,} balls need about {needed / _GIB:.2g} GiB of memory, "
-            f"{there / _GIB:.2g} GiB are free; about {int(balls * there / needed):,} balls fit: "
+            f"{there / _GIB:.2g} GiB are free; about {fitting:,} balls fit: "
             f"set 'balls.count' or --balls"
         )
-
-
-def estimate_memory(balls: int) -> int:
-    """Bytes that so many balls take."""
-    return _BYTES_PER_BALL * balls
 
 
 def available_memory() -> int | None:
