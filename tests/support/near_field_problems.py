@@ -73,7 +73,8 @@ def annulus(
     load = WallLoad(False, ANFO.isentrope, inner, start, target, rise)
     return Annulus(
         material, float(friction_number(of.friction_angle)),
-        float(friction_number(of.dilation_angle)), inner, outer, first, np.inf, zones, in_situ, quiet, load, end, 1.8, courant, 5_000_000,
+        float(friction_number(of.dilation_angle)), inner, outer, first, np.inf, zones, in_situ,
+        quiet, load, end, 1.8, courant, 5_000_000,
     )  # fmt: skip
 
 

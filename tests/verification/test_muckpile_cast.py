@@ -10,9 +10,9 @@ import pytest
 from castblast.errors import Status
 from castblast.muckpile.bench import Bench, block_shape, block_velocities, row_delays
 from castblast.muckpile.contact import ContactLaw
+from castblast.muckpile.metrics import pile_metrics
 from castblast.muckpile.packing import fill_bench, mean_radius_for_count
 from castblast.muckpile.particles import particles_at_rest
-from castblast.muckpile.metrics import pile_metrics
 from castblast.muckpile.solver import CastCase, check_case, run_cast
 from castblast.muckpile.walls import bench_walls, floor
 

@@ -353,9 +353,7 @@ def march_many(
         _start(state, cases, lane, order[taken], record)
         taken += 1
         running += 1
-    done = 0
-    for lane in range(LANES):
-        done += 1 if state.case[lane] != _IDLE and state.status[lane] != NOT_CONVERGED else 0
+    done = 1  # a case may have ended before its first step
     while running > 0:
         while done > 0:
             done = 0

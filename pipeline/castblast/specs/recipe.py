@@ -333,8 +333,7 @@ class Recipe(Spec):
         base = self.variables.get(spec.ratio_of)
         if base is None:
             return [
-                f"variables.{spec.name}.ratio_of: {spec.ratio_of} is not among the variables of "
-                "this recipe; add it"
+                f"variables.{spec.name}.ratio_of: {spec.ratio_of} is not in this recipe; add it"
             ]
         if base.ratio_of is not None:
             return [f"variables.{spec.name}.ratio_of: {base.name} is a ratio itself"]
