@@ -332,7 +332,7 @@ class Recipe(Spec):
             return []
         base = self.variables.get(spec.ratio_of)
         if base is None:
-            return [f"variables.{spec.name}.ratio_of: {spec.ratio_of} is no variable of the recipe"]
+            return [f"variables.{spec.name}.ratio_of: {spec.ratio_of} is not among the variables"]
         if base.ratio_of is not None:
             return [f"variables.{spec.name}.ratio_of: {base.name} is a ratio itself"]
         low, high = spec.at(0.0) * base.at(0.0), spec.at(1.0) * base.at(1.0)
