@@ -20,18 +20,19 @@ on logarithmic strains, whose elastic and plastic parts add because the axes nev
 
     q = rho c l C_L d + rho w^2 C_Q d^2 (only where d > 0),   d = -(volumetric strain rate)
 
-with c the p-wave speed and l = 0.04 r. The quadratic part spreads shocks. The linear part
-belongs to the model: with sin(phi) > 1 - 2 nu the non-associated flow is unstable without it
-(Sandler & Rubin 1987) and refinement makes the answer worse. The instability oscillates, so the
-linear part must act in expansion as well as in compression; and only with a length that does not
-shrink with the zones is there a solution for the mesh to converge to. Measured on rock with
-phi 53 degrees, nu 0.25, UCS 11 MPa, E 24 GPa (120, 240, 480 zones; equilibrium pressure in MPa):
-compression only, l = w: 51.7, 52.2, 53.3, diverging; both signs, l at least 0.04 r, C_L 0.3:
-54.96, 54.97, 54.98. On zones wider than that l stays 0.04 r, or a coarse mesh would have another
-viscosity and twice the error in pressure. The length changes the pressure by less than 0.1 percent in strong rock and by
-about 1 percent in the weakest (C_L 0.15 against 0.3). It is a share of the radius, so geometric
-similarity is kept. The price: outgoing waves are damped, so kinetic and elastic energy at the end
-are too low by what `viscous_work` is too high; their sum, the radiated share, is converged.
+with c the p-wave speed and l = 0.04 r. The quadratic part spreads shocks. The linear part belongs
+to the model: with sin(phi) > 1 - 2 nu the non-associated flow is unstable without it (Sandler &
+Rubin 1987) and refinement makes the answer worse. The instability oscillates, so the linear part
+must act in expansion as well as in compression; and only with a length that does not shrink with
+the zones is there a solution for the mesh to converge to. Measured on rock with phi 53 degrees,
+nu 0.25, UCS 11 MPa, E 24 GPa (120, 240, 480 zones; equilibrium pressure in MPa): compression
+only, l = w: 51.7, 52.2, 53.3, diverging; both signs, l at least 0.04 r, C_L 0.3: 54.96, 54.97,
+54.98. On zones wider than that l stays 0.04 r, or a coarse mesh would have another viscosity and
+twice the error in pressure. The length changes the pressure by less than 0.1 percent in strong
+rock and by about 1 percent in the weakest (C_L 0.15 against 0.3). It is a share of the radius, so
+geometric similarity is kept. The price: outgoing waves are damped, so kinetic and elastic energy
+at the end are too low by what `viscous_work` is too high; their sum, the radiated share, is
+converged.
 """
 
 from __future__ import annotations
