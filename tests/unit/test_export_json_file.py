@@ -21,7 +21,7 @@ def text(toy_dataset) -> str:
 
 def test_the_file_says_what_a_reader_needs(text: str) -> None:
     document = json.loads(text)
-    assert document["schema_version"] == 1
+    assert document["schema_version"] == 2
     assert document["explosives"] == ["anfo", "doped_emulsion", "gassed_emulsion", "heavy_anfo"]
     assert document["inputs"][0]["unit"] == "Pa"
     assert 0.0 < document["outputs"][0]["relative_band"] < 1.0
@@ -44,7 +44,7 @@ def test_no_times_or_paths_in_the_file(text: str) -> None:
     [
         (lambda d: d.pop("layers"), "entry 'layers' is missing"),
         (lambda d: d.update(format="onnx"), "not a network of castblast"),
-        (lambda d: d.update(schema_version=9), "schema version 9, this one reads 1"),
+        (lambda d: d.update(schema_version=9), "schema version 9, this one reads 1 and 2"),
         (lambda d: d["layers"][0].update(biases=["x"]), "unusable entry"),
         (lambda d: d["layers"][0].update(weights=[[1.0], [2.0]]), "do not take 10 values"),
         (lambda d: d["inputs"][0].pop("mean"), "unusable entry"),

@@ -8,7 +8,7 @@ equal bytes.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,10 @@ import numpy as np
 from castblast.errors import SpecError
 from castblast.network import (
     SCHEMA_VERSION,
+    Column,
     Constraint,
+    DensityScore,
+    DerivedColumn,
     Floats,
     GoldenRows,
     InputColumn,
@@ -28,6 +31,8 @@ from castblast.network import (
 )
 
 _FORMAT = "castblast network"
+#: Layouts that are read; one of version 1 has no derived columns, density or members.
+_READABLE = (1, SCHEMA_VERSION)
 
 
 def to_document(network: Network) -> dict[str, Any]:
@@ -37,18 +42,14 @@ def to_document(network: Network) -> dict[str, Any]:
         "schema_version": network.schema_version,
         "provenance": dict(network.provenance),
         "inputs": [_plain(column) for column in network.inputs],
+        "derived": [_plain(column) for column in network.derived],
         "explosives": list(network.explosives),
         "explosive_codes": network.codes.tolist(),
-        "layers": [
-            {
-                "activation": layer.activation,
-                "weights": layer.weights.tolist(),
-                "biases": layer.biases.tolist(),
-            }
-            for layer in network.layers
-        ],
+        "layers": _chain(network.layers),
+        "members": [_chain(member) for member in network.members],
         "outputs": [_plain(column) for column in network.outputs],
         "constraints": [_plain(rule) for rule in network.constraints],
+        "density": None if network.density is None else _plain(network.density),
         "golden": {
             "inputs": network.golden.inputs.tolist(),
             "explosives": list(network.golden.explosives),
@@ -57,9 +58,25 @@ def to_document(network: Network) -> dict[str, Any]:
     }
 
 
-def _plain(record: InputColumn | OutputColumn | Constraint) -> dict[str, Any]:
+def _chain(layers: Sequence[Layer]) -> list[dict[str, Any]]:
+    return [
+        {
+            "activation": layer.activation,
+            "weights": layer.weights.tolist(),
+            "biases": layer.biases.tolist(),
+        }
+        for layer in layers
+    ]
+
+
+def _plain(record: Column | Constraint | DensityScore) -> dict[str, Any]:
     values = {entry.name: getattr(record, entry.name) for entry in fields(record)}
-    return {key: dict(v) if isinstance(v, Mapping) else v for key, v in values.items()}
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            values[key] = dict(value)
+        elif isinstance(value, np.ndarray):
+            values[key] = value.tolist()
+    return values
 
 
 def to_json(network: Network) -> str:
@@ -95,9 +112,9 @@ def from_document(document: Mapping[str, Any]) -> Network:
     if document.get("format") != _FORMAT:
         message = f"not a network of castblast (format {document.get('format')!r})"
         raise SpecError(message)
-    if document.get("schema_version") != SCHEMA_VERSION:
+    if document.get("schema_version") not in _READABLE:
         found = document.get("schema_version")
-        message = f"schema version {found!r}, this one reads {SCHEMA_VERSION}"
+        message = f"schema version {found!r}, this one reads {' and '.join(map(str, _READABLE))}"
         raise SpecError(message)
     try:
         return _build(document)
@@ -115,17 +132,34 @@ def _build(document: Mapping[str, Any]) -> Network:
         inputs=tuple(InputColumn(**entry) for entry in document["inputs"]),
         explosives=tuple(document["explosives"]),
         codes=_floats(document["explosive_codes"]),
-        layers=tuple(
-            Layer(_floats(entry["weights"]), _floats(entry["biases"]), entry["activation"])
-            for entry in document["layers"]
-        ),
+        layers=_read_chain(document["layers"]),
         outputs=tuple(OutputColumn(**entry) for entry in document["outputs"]),
         constraints=tuple(Constraint(**entry) for entry in document["constraints"]),
         golden=GoldenRows(
             _floats(golden["inputs"]), tuple(golden["explosives"]), _floats(golden["outputs"])
         ),
         provenance=document["provenance"],
-        schema_version=document["schema_version"],
+        **(_second_version(document) if document["schema_version"] > 1 else {}),
+    )
+
+
+def _second_version(document: Mapping[str, Any]) -> dict[str, Any]:
+    """Read the entries that version 1 did not have."""
+    density = document["density"]
+    if density is not None:
+        arrays = {key: _floats(density[key]) for key in ("centres", "whitening", "offsets")}
+        density = DensityScore(**{**density, **arrays})
+    return {
+        "derived": tuple(DerivedColumn(**entry) for entry in document["derived"]),
+        "density": density,
+        "members": tuple(_read_chain(member) for member in document["members"]),
+    }
+
+
+def _read_chain(layers: Sequence[Mapping[str, Any]]) -> tuple[Layer, ...]:
+    return tuple(
+        Layer(_floats(entry["weights"]), _floats(entry["biases"]), entry["activation"])
+        for entry in layers
     )
 
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.network import Column, Floats, Network
+from castblast.network import Column, Floats, Layer, Network, derived_matrix
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -58,6 +58,26 @@ class _Graph:
         mask = self.constant(f"{x}_is_log", logged)
         return self.add("Where", f"{x}_transformed", mask, changed, x)
 
+    def scaled(self, x: str, prefix: str, columns: Sequence[Column]) -> str:
+        """Transform and standardise the columns of `x`."""
+        mean = self.constant(f"{prefix}_mean", _of(columns, "mean"))
+        scale = self.constant(f"{prefix}_scale", _of(columns, "scale"))
+        x = self.transform("Log", x, columns)
+        x = self.add("Sub", f"{prefix}_centred", x, mean)
+        return self.add("Div", f"{prefix}_scaled", x, scale)
+
+    def dense(self, x: str, number: int, layer: Layer) -> str:
+        """One layer; the last node carries its activation."""
+        weights = self.constant(f"weights_{number}", layer.weights)
+        biases = self.constant(f"biases_{number}", layer.biases)
+        x = self.add("Gemm", f"sum_{number}", x, weights, biases)
+        if layer.activation == "identity":
+            return x
+        if layer.activation == "silu":
+            gate = self.add("Sigmoid", f"gate_{number}", x)
+            return self.add("Mul", f"node_{number}", x, gate)
+        return self.add(_OPERATORS[layer.activation], f"node_{number}", x)
+
 
 def to_onnx(network: Network) -> bytes:
     """Build the ONNX file of a network.
@@ -71,18 +91,16 @@ def to_onnx(network: Network) -> bytes:
     from onnx import TensorProto, helper
 
     graph = _Graph()
-    x = graph.transform("Log", "numeric", network.inputs)
-    x = graph.add("Sub", "centred", x, graph.constant("input_mean", _of(network.inputs, "mean")))
-    x = graph.add("Div", "scaled", x, graph.constant("input_scale", _of(network.inputs, "scale")))
+    parts = [graph.scaled("numeric", "input", network.inputs)]
+    if network.derived:
+        combination = graph.constant("derived_coefficients", derived_matrix(network))
+        derived = graph.add("MatMul", "derived", "numeric", combination)
+        parts.append(graph.scaled(derived, "derived", network.derived))
     codes = graph.constant("explosive_codes", network.codes)
-    code = graph.add("Gather", "explosive_code", codes, "explosive", axis=0)
-    x = graph.add("Concat", "features", x, code, axis=1)
+    parts.append(graph.add("Gather", "explosive_code", codes, "explosive", axis=0))
+    x = graph.add("Concat", "features", *parts, axis=1)
     for number, layer in enumerate(network.layers, 1):
-        weights = graph.constant(f"weights_{number}", layer.weights)
-        biases = graph.constant(f"biases_{number}", layer.biases)
-        x = graph.add("Gemm", f"sum_{number}", x, weights, biases)
-        if layer.activation != "identity":
-            x = graph.add(_OPERATORS[layer.activation], f"node_{number}", x)
+        x = graph.dense(x, number, layer)
     x = graph.add("Mul", "spread", x, graph.constant("output_scale", _of(network.outputs, "scale")))
     x = graph.add("Add", "values", x, graph.constant("output_mean", _of(network.outputs, "mean")))
     x = graph.transform("Exp", x, network.outputs)

@@ -1,0 +1,66 @@
+"""A fitted surrogate as plain numbers: the one record that every export and `predict` reads.
+
+`record` says what is in it, `evaluate` computes values, `domain` says where they may be used.
+It knows no training library; NumPy alone evaluates it.
+"""
+
+from castblast.network.domain import (
+    DomainKind,
+    DomainViolation,
+    density_score,
+    domain_faults,
+    domain_violations,
+    in_domain,
+)
+from castblast.network.evaluate import (
+    RowPredictions,
+    derived_matrix,
+    evaluate,
+    evaluate_rows,
+    explosive_index,
+    member_spread,
+    predict_rows,
+    scaled_inputs,
+)
+from castblast.network.record import (
+    Column,
+    Constraint,
+    DensityScore,
+    DerivedColumn,
+    GoldenRows,
+    InputColumn,
+    Layer,
+    Network,
+    OutputColumn,
+)
+from castblast.network.terms import SCHEMA_VERSION, Activation, Floats, Transform
+
+__all__ = [
+    "SCHEMA_VERSION",
+    "Activation",
+    "Column",
+    "Constraint",
+    "DensityScore",
+    "DerivedColumn",
+    "DomainKind",
+    "DomainViolation",
+    "Floats",
+    "GoldenRows",
+    "InputColumn",
+    "Layer",
+    "Network",
+    "OutputColumn",
+    "RowPredictions",
+    "Transform",
+    "density_score",
+    "derived_matrix",
+    "domain_faults",
+    "domain_violations",
+    "evaluate",
+    "evaluate_rows",
+    "explosive_index",
+    "in_domain",
+    "member_spread",
+    "predict_rows",
+    "scaled_inputs",
+]

@@ -1,0 +1,147 @@
+"""Where a network may be used: box, linear rules and joint density of its training rows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from castblast.network.record import Column, DensityScore, Network
+from castblast.network.terms import Floats
+
+#: What refuses a row: range of one input, rule between inputs, joint density.
+DomainKind = Literal["box", "rule", "density"]
+#: Inputs whose free choice would lower the score by this share of the best such choice are named.
+_BLAME = 0.5
+
+
+class DomainViolation(NamedTuple):
+    """One reason why a row lies outside the training domain."""
+
+    inputs: tuple[str, ...]
+    message: str
+    kind: DomainKind = "box"
+
+
+def scale_columns(values: Floats, columns: tuple[Column, ...]) -> Floats:
+    """Transform and standardise SI values (n, len(columns)); what cannot be logged gives NaN."""
+    logged = np.array([column.transform == "log" for column in columns], dtype=bool)
+    mean = np.array([column.mean for column in columns])
+    scale = np.array([column.scale for column in columns])
+    x: Floats = values.astype(np.float64)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        x[:, logged] = np.log(x[:, logged])
+        scaled: Floats = (x - mean) / scale
+    return scaled
+
+
+def density_score(network: Network, numeric: Floats) -> Floats:
+    """Score rows of SI inputs (n, k) against the joint density of the training rows.
+
+    Returns
+    -------
+    (n,) float64
+        At most 1 inside; NaN where an input cannot be scaled, and everywhere if the network has
+        no density.
+    """
+    if network.density is None:
+        return np.full(len(numeric), np.nan)
+    distances = _distances(network.density, scale_columns(numeric, network.inputs))
+    return np.asarray(np.min(distances, axis=0) / network.density.threshold)
+
+
+def _distances(density: DensityScore, scaled: Floats) -> Floats:
+    """Squared distance and offset of every centre, (c, n)."""
+    distances = np.empty((len(density.centres), len(scaled)))
+    with np.errstate(invalid="ignore", over="ignore"):
+        for j, (centre, whitening) in enumerate(
+            zip(density.centres, density.whitening, strict=True)
+        ):
+            steps = (scaled - centre) @ whitening.T
+            distances[j] = np.sum(steps * steps, axis=1) + density.offsets[j]
+    return distances
+
+
+def density_reliefs(network: Network, numeric: Floats) -> Floats:
+    """How far the score of each row would fall if one input were free, (n, k).
+
+    About the nearest centre c with P = whitening' whitening and d = z - c, letting input i go to
+    its best value given the others lowers the squared distance by (P d)_i² / P_ii.
+    """
+    density = network.density
+    if density is None:
+        return np.zeros((len(numeric), len(network.inputs)))
+    scaled = scale_columns(numeric, network.inputs)
+    nearest = np.argmin(np.nan_to_num(_distances(density, scaled), nan=np.inf), axis=0)
+    whitening = density.whitening[nearest]
+    steps = np.einsum("nij,nj->ni", whitening, scaled - density.centres[nearest])
+    slopes = np.einsum("nij,ni->nj", whitening, steps)
+    return np.asarray(slopes**2 / np.sum(whitening**2, axis=1) / density.threshold)
+
+
+def in_domain(network: Network, numeric: Floats) -> NDArray[np.bool_]:
+    """Tell for each row of SI inputs (n, k) whether it lies in the domain; NaN does not."""
+    lower = np.array([column.lower for column in network.inputs])
+    upper = np.array([column.upper for column in network.inputs])
+    inside: NDArray[np.bool_] = np.all((numeric >= lower) & (numeric <= upper), axis=1)
+    row = dict(zip(network.input_names, numeric.T, strict=True))
+    for rule in network.constraints:
+        inside &= rule.margin(row) >= 0.0
+    if network.density is not None:
+        inside &= density_score(network, numeric) <= 1.0
+    return inside
+
+
+def domain_violations(network: Network, row: Mapping[str, float]) -> list[DomainViolation]:
+    """Give every reason why one row of SI inputs lies outside the training domain.
+
+    Returns
+    -------
+    list of DomainViolation
+        The inputs at fault and a line with value and range in display units; empty if inside.
+        The joint density is told only where ranges and rules say nothing.
+    """
+    violations = []
+    for column in network.inputs:
+        value = float(row[column.name])
+        if not column.lower <= value <= column.upper:
+            trained = f"{column.show(column.lower)} to {column.show(column.upper)}"
+            message = f"{column.name} = {column.show(value)}: trained on {trained}"
+            violations.append(DomainViolation((column.name,), message, "box"))
+    shown = {column.name: column.show(float(row[column.name])) for column in network.inputs}
+    for rule in network.constraints:
+        # Written so that NaN breaks the rule, as in `in_domain`.
+        if not rule.margin(row) >= 0.0:
+            values = ", ".join(f"{name} = {shown[name]}" for name in rule.coefficients)
+            message = f"{values}: trained on {rule.label}"
+            violations.append(DomainViolation(tuple(rule.coefficients), message, "rule"))
+    return violations or _density_violation(network, row, shown)
+
+
+def _density_violation(
+    network: Network, row: Mapping[str, float], shown: Mapping[str, str]
+) -> list[DomainViolation]:
+    """Tell of a row whose single values are usual, but not together."""
+    numeric = np.array([[float(row[name]) for name in network.input_names]])
+    score = float(density_score(network, numeric)[0])
+    if network.density is None or score <= 1.0:
+        return []
+    reliefs = density_reliefs(network, numeric)[0]
+    named = tuple(
+        name
+        for name, relief in zip(network.input_names, reliefs, strict=True)
+        if not relief < _BLAME * np.max(reliefs)
+    )
+    values = ", ".join(f"{name} = {shown[name]}" for name in named)
+    message = (
+        f"{values}: unusual together, score {score:.3g} where {network.density.level:.2%} of "
+        "such rows stay below 1"
+    )
+    return [DomainViolation(named, message, "density")]
+
+
+def domain_faults(network: Network, row: Mapping[str, float]) -> list[str]:
+    """Messages of `domain_violations`."""
+    return [violation.message for violation in domain_violations(network, row)]

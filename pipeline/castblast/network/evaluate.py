@@ -1,0 +1,176 @@
+"""Values of a network: for rows of numbers, for named inputs, with band and domain."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from castblast.errors import SpecError, nearest_name
+from castblast.network.domain import density_score, in_domain, scale_columns
+from castblast.network.record import Layer, Network
+from castblast.network.terms import Floats
+
+
+def _logistic(x: Floats) -> Floats:
+    # Two forms, so that neither overflows.
+    small = np.exp(-np.abs(x))
+    result: Floats = np.where(x >= 0.0, 1.0, small) / (1.0 + small)
+    return result
+
+
+_ACTIVATIONS: dict[str, Callable[[Floats], Floats]] = {
+    "identity": lambda x: x,
+    "tanh": np.tanh,
+    "relu": lambda x: np.maximum(x, 0.0),
+    "logistic": _logistic,
+    "silu": lambda x: x * _logistic(x),
+}
+
+
+class RowPredictions(NamedTuple):
+    """Answers for n rows.
+
+    Attributes
+    ----------
+    values, lower, upper : (n, m) [SI]
+        Prediction and ends of its 95 % band, meant for rows inside the domain.
+    score : (n,)
+        Joint density score, at most 1 inside; NaN if the network has none.
+    inside : (n,) bool
+        Box, rules and density together.
+    """
+
+    values: Floats
+    lower: Floats
+    upper: Floats
+    score: Floats
+    inside: NDArray[np.bool_]
+
+
+def explosive_index(network: Network, name: str) -> int:
+    """Position of an explosive in the codes.
+
+    Raises
+    ------
+    SpecError
+        The network was not trained on it; the message lists those it knows.
+    """
+    if name not in network.explosives:
+        hint = nearest_name(name, network.explosives)
+        known = ", ".join(network.explosives)
+        message = f"explosive '{name}': this network does not know it{hint} (it knows {known})"
+        raise SpecError(message)
+    return network.explosives.index(name)
+
+
+def scaled_inputs(network: Network, numeric: Floats, index: NDArray[np.int64]) -> Floats:
+    """What enters the first layer: scaled inputs, scaled derived columns, codes; (n, k + d + c)."""
+    parts = [scale_columns(numeric, network.inputs)]
+    if network.derived:
+        parts.append(scale_columns(numeric @ derived_matrix(network), network.derived))
+    return np.concatenate([*parts, network.codes[index]], axis=1)
+
+
+def derived_matrix(network: Network) -> Floats:
+    """Coefficients (k, d): numeric inputs @ matrix = derived columns, both SI."""
+    return np.array(
+        [
+            [column.coefficients.get(name, 0.0) for column in network.derived]
+            for name in network.input_names
+        ],
+        dtype=np.float64,
+    )
+
+
+def evaluate_rows(network: Network, numeric: Floats, index: NDArray[np.int64]) -> Floats:
+    """Evaluate rows of SI inputs.
+
+    Parameters
+    ----------
+    numeric : (n, k) float64, SI, columns as `network.inputs`
+        A value of 0 or below in a log column gives NaN or 0, never an exception.
+    index : (n,) int64
+        Position of each row's explosive.
+
+    Returns
+    -------
+    (n, m) float64, SI, columns as `network.outputs`
+    """
+    return _run(network, network.layers, scaled_inputs(network, numeric, index))
+
+
+def _run(network: Network, layers: Sequence[Layer], x: Floats) -> Floats:
+    """Scaled rows through a chain of layers to outputs in SI."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        for layer in layers:
+            x = _ACTIVATIONS[layer.activation](x @ layer.weights + layer.biases)
+        x = x * np.array([c.scale for c in network.outputs])
+        x = x + np.array([c.mean for c in network.outputs])
+        logged = np.array([column.transform == "log" for column in network.outputs])
+        x[:, logged] = np.exp(x[:, logged])
+    return x
+
+
+def member_spread(network: Network, numeric: Floats, index: NDArray[np.int64]) -> Floats:
+    """Relative standard deviation over the network and its members, (n, m).
+
+    Of the outputs of all, over the absolute value of the network itself; NaN without members.
+    """
+    x = scaled_inputs(network, numeric, index)
+    chains = (network.layers, *network.members)
+    answers = np.stack([_run(network, layers, x) for layers in chains])
+    if not network.members:
+        return np.full(answers.shape[1:], np.nan)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.std(answers, axis=0, ddof=1) / np.abs(answers[0]))
+
+
+def predict_rows(network: Network, numeric: Floats, index: NDArray[np.int64]) -> RowPredictions:
+    """Evaluate rows of SI inputs with their band and domain; parameters as `evaluate_rows`."""
+    values = evaluate_rows(network, numeric, index)
+    half = np.abs(values) * np.array([column.relative_band for column in network.outputs])
+    score = density_score(network, numeric)
+    return RowPredictions(values, values - half, values + half, score, in_domain(network, numeric))
+
+
+def evaluate(
+    network: Network, values: Mapping[str, ArrayLike], explosive: str | Sequence[str]
+) -> dict[str, Floats]:
+    """Evaluate a network on named SI inputs.
+
+    Parameters
+    ----------
+    network : Network
+    values : mapping of input name to number or array [SI]
+        Exactly the inputs of the network; arrays broadcast against each other.
+    explosive : str or sequence of str
+        One name for all rows, or one per row (values then broadcast to that many rows).
+
+    Returns
+    -------
+    dict of output name to array [SI]
+        Each of the broadcast shape (0-d for plain numbers).
+
+    Raises
+    ------
+    SpecError
+        A missing or unknown input, or an explosive the network does not know; all at once.
+    """
+    names = network.input_names
+    faults = [f"{name}: missing, this network needs it" for name in names if name not in values]
+    faults += [f"{name}: no input of this network{nearest_name(name, names)}"
+               for name in values if name not in names]  # fmt: skip
+    if faults:
+        raise SpecError("\n".join(faults))
+    if isinstance(explosive, str):
+        index = np.asarray(explosive_index(network, explosive))
+    else:
+        index = np.array([explosive_index(network, name) for name in explosive], dtype=np.int64)
+    arrays = [np.asarray(values[name], dtype=np.float64) for name in names]
+    *columns, index = np.broadcast_arrays(*arrays, index)
+    numeric = np.stack([column.ravel() for column in columns], axis=1)
+    result = evaluate_rows(network, numeric, index.ravel())
+    return {name: result[:, j].reshape(index.shape) for j, name in enumerate(network.output_names)}

@@ -1,0 +1,112 @@
+"""Everything that makes a network record unusable, all of it at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, get_args
+
+import numpy as np
+
+from castblast.network.terms import SCHEMA_VERSION, Activation, Transform
+
+if TYPE_CHECKING:
+    from castblast.network.record import Column, DensityScore, Layer, Network
+
+
+def network_faults(network: Network) -> list[str]:
+    """Say what is wrong with a network, one line each; empty if nothing is."""
+    faults = []
+    if network.schema_version != SCHEMA_VERSION:
+        faults.append(f"schema version {network.schema_version}, this one reads {SCHEMA_VERSION}")
+    if not (network.inputs and network.outputs and network.layers and network.explosives):
+        faults.append("needs at least one input, output, layer and explosive")
+    columns: tuple[Column, ...] = network.inputs + network.derived + network.outputs
+    names = [column.name for column in columns]
+    if len(set(names)) != len(names) or len(set(network.explosives)) != len(network.explosives):
+        faults.append("a name appears twice")
+    faults += _column_faults(columns)
+    for entry in network.inputs:
+        least = 0.0 if entry.transform == "log" else -np.inf
+        if not least < entry.lower <= entry.upper < np.inf:
+            faults.append(f"{entry.name}: domain {entry.lower!r} to {entry.upper!r} is no range")
+    faults += [
+        f"{column.name}: the error band must be finite and not negative"
+        for column in network.outputs
+        if not 0.0 <= column.relative_band < np.inf
+    ]
+    for rule in network.constraints:
+        faults += _unknown_inputs(f"rule '{rule.label}'", rule.coefficients, network)
+    for column in network.derived:
+        faults += _unknown_inputs(column.name, column.coefficients, network)
+    return faults + _shape_faults(network) + _golden_faults(network)
+
+
+def _column_faults(columns: Iterable[Column]) -> list[str]:
+    faults = []
+    for column in columns:
+        if column.transform not in get_args(Transform):
+            faults.append(f"{column.name}: unknown transform '{column.transform}'")
+        if not (np.isfinite(column.mean) and np.isfinite(column.scale) and column.scale > 0.0):
+            faults.append(f"{column.name}: mean and scale must be finite, scale above 0")
+    return faults
+
+
+def _unknown_inputs(what: str, coefficients: Mapping[str, float], network: Network) -> list[str]:
+    known = network.input_names
+    return [f"{what}: no input '{name}'" for name in coefficients if name not in known]
+
+
+def _shape_faults(network: Network) -> list[str]:
+    if network.codes.ndim != 2 or len(network.codes) != len(network.explosives):
+        return ["one row of codes per explosive is needed"]
+    width = len(network.inputs) + len(network.derived) + network.codes.shape[1]
+    faults = _chain_faults(network.layers, width, len(network.outputs))
+    for number, member in enumerate(network.members, 1):
+        lines = _chain_faults(member, width, len(network.outputs))
+        faults += [f"member {number}: {line}" for line in lines]
+    if network.density is not None:
+        faults += _density_faults(network.density, len(network.inputs))
+    return faults
+
+
+def _chain_faults(layers: Sequence[Layer], width: int, outputs: int) -> list[str]:
+    """Faults of a chain of layers that takes `width` values."""
+    faults = []
+    for number, layer in enumerate(layers, 1):
+        if layer.activation not in get_args(Activation):
+            faults.append(f"layer {number}: unknown activation '{layer.activation}'")
+        if layer.weights.ndim != 2 or layer.weights.shape[0] != width:
+            shape = layer.weights.shape
+            return [*faults, f"layer {number}: weights {shape} do not take {width} values"]
+        width = layer.weights.shape[1]
+        if layer.biases.shape != (width,):
+            faults.append(f"layer {number}: {layer.biases.shape} biases for {width} nodes")
+        if not (np.isfinite(layer.weights).all() and np.isfinite(layer.biases).all()):
+            faults.append(f"layer {number}: weights and biases must be finite")
+    if width != outputs:
+        faults.append(f"the last layer gives {width} values for {outputs} outputs")
+    return faults
+
+
+def _density_faults(density: DensityScore, inputs: int) -> list[str]:
+    count = len(density.centres)
+    shapes = density.centres.shape, density.whitening.shape, density.offsets.shape
+    if count < 1 or shapes != ((count, inputs), (count, inputs, inputs), (count,)):
+        return [f"density: centres, whitening, offsets {shapes} do not fit {inputs} inputs"]
+    numbers = (density.centres, density.whitening, density.offsets, density.threshold)
+    if not all(np.isfinite(entry).all() for entry in numbers) or not density.threshold > 0.0:
+        return ["density: numbers must be finite, the threshold above 0"]
+    if not 0.0 < density.level <= 1.0:
+        return [f"density: level {density.level!r} is no share"]
+    return []
+
+
+def _golden_faults(network: Network) -> list[str]:
+    rows, golden, faults = len(network.golden.explosives), network.golden, []
+    if golden.inputs.shape != (rows, len(network.inputs)) or (
+        golden.outputs.shape != (rows, len(network.outputs))
+    ):
+        faults.append("golden rows do not have the shape of the inputs and outputs")
+    if not set(golden.explosives) <= set(network.explosives):
+        faults.append("golden rows name an unknown explosive")
+    return faults
