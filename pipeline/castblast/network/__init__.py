@@ -7,10 +7,12 @@ It knows no training library; NumPy alone evaluates it.
 from castblast.network.domain import (
     DomainKind,
     DomainViolation,
+    density_reliefs,
     density_score,
     domain_faults,
     domain_violations,
     in_domain,
+    scale_columns,
 )
 from castblast.network.evaluate import (
     RowPredictions,
@@ -52,6 +54,7 @@ __all__ = [
     "OutputColumn",
     "RowPredictions",
     "Transform",
+    "density_reliefs",
     "density_score",
     "derived_matrix",
     "domain_faults",
@@ -62,5 +65,6 @@ __all__ = [
     "in_domain",
     "member_spread",
     "predict_rows",
+    "scale_columns",
     "scaled_inputs",
 ]

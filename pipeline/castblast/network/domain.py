@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.network.record import Column, DensityScore, Network
+from castblast.network.record import Column, Network
 from castblast.network.terms import Floats
 
 #: What refuses a row: range of one input, rule between inputs, joint density.
@@ -48,20 +48,8 @@ def density_score(network: Network, numeric: Floats) -> Floats:
     """
     if network.density is None:
         return np.full(len(numeric), np.nan)
-    distances = _distances(network.density, scale_columns(numeric, network.inputs))
+    distances = network.density.distances(scale_columns(numeric, network.inputs))
     return np.asarray(np.min(distances, axis=0) / network.density.threshold)
-
-
-def _distances(density: DensityScore, scaled: Floats) -> Floats:
-    """Squared distance and offset of every centre, (c, n)."""
-    distances = np.empty((len(density.centres), len(scaled)))
-    with np.errstate(invalid="ignore", over="ignore"):
-        for j, (centre, whitening) in enumerate(
-            zip(density.centres, density.whitening, strict=True)
-        ):
-            steps = (scaled - centre) @ whitening.T
-            distances[j] = np.sum(steps * steps, axis=1) + density.offsets[j]
-    return distances
 
 
 def density_reliefs(network: Network, numeric: Floats) -> Floats:
@@ -74,7 +62,7 @@ def density_reliefs(network: Network, numeric: Floats) -> Floats:
     if density is None:
         return np.zeros((len(numeric), len(network.inputs)))
     scaled = scale_columns(numeric, network.inputs)
-    nearest = np.argmin(np.nan_to_num(_distances(density, scaled), nan=np.inf), axis=0)
+    nearest = np.argmin(np.nan_to_num(density.distances(scaled), nan=np.inf), axis=0)
     whitening = density.whitening[nearest]
     steps = np.einsum("nij,nj->ni", whitening, scaled - density.centres[nearest])
     slopes = np.einsum("nij,ni->nj", whitening, steps)

@@ -17,6 +17,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from castblast.errors import SpecError
 from castblast.network.faults import network_faults
 from castblast.network.terms import SCHEMA_VERSION, Activation, Floats, Transform
@@ -130,6 +132,15 @@ class DensityScore:
     offsets: Floats
     threshold: float
     level: float
+
+    def distances(self, scaled: Floats) -> Floats:
+        """Squared distance and offset of every centre for scaled inputs (n, k): (c, n)."""
+        distances = np.empty((len(self.centres), len(scaled)))
+        with np.errstate(invalid="ignore", over="ignore"):
+            for j, (centre, whitening) in enumerate(zip(self.centres, self.whitening, strict=True)):
+                steps = (scaled - centre) @ whitening.T
+                distances[j] = np.sum(steps * steps, axis=1) + self.offsets[j]
+        return distances
 
 
 @dataclass(frozen=True, eq=False)
