@@ -16,11 +16,9 @@ import numpy as np
 import pytest
 
 from castblast.errors import SpecError
+from castblast.export.deck import plan_firings, radius_types, time_step
 from castblast.export.lammps_deck import (
-    plan_firings,
-    radius_types,
     restitution_for,
-    time_step,
     write_lammps_deck,
 )
 from castblast.muckpile.bench import Bench
@@ -97,7 +95,7 @@ def test_the_deck_holds_the_case(tmp_path):
     case = small_case()
     data, script = write_lammps_deck(tmp_path, case)
     text, words = data.read_text(), script.read_text()
-    atoms = np.loadtxt(text.split("# sphere\n")[1].split("Velocities")[0].strip().splitlines())
+    atoms = np.loadtxt(text.split("Atoms\n")[1].split("Velocities")[0].strip().splitlines())
     balls = case.particles
     np.testing.assert_array_equal(atoms[:, 0], np.arange(1, 241))
     np.testing.assert_array_equal(atoms[:, 2], 2.0 * balls.radius)
