@@ -69,11 +69,14 @@ class Domain:
     simulator : Simulator
     explosives : tuple of str
         Names as in the dataset, in the order of the recipe.
+    energy : (len(explosives),) [J m-3]
+        Heat of explosion of each per volume.
     """
 
     recipe: Recipe
     simulator: Simulator
     explosives: tuple[str, ...]
+    energy: Floats
 
     @property
     def sampled(self) -> tuple[str, ...]:
@@ -157,7 +160,10 @@ class Domain:
         for spec in self.recipe.fixed:
             if spec.ratio_of is not None:
                 raw[spec.name] = spec.at(0.0) * raw[spec.ratio_of]
-        inside = self._in_ranges(raw) & self._allowed(raw)
+        inside = self._in_ranges(raw)
+        # Twice: outside the ranges a value may be none that the physics even looks at.
+        raw = {name: np.where(inside, values, held[name]) for name, values in raw.items()}
+        inside &= self._allowed(raw)
         raw = {name: np.where(inside, values, held[name]) for name, values in raw.items()}
         return self._resolved(raw, points.explosive, points.shares), inside
 
@@ -223,7 +229,8 @@ def dataset_domain(dataset: xr.Dataset, where: str = "dataset") -> Domain:
         explosive_from_text(text, f"{where}: {name}").spec.to_explosive()
         for name, text in texts.items()
     )
-    return Domain(recipe, blast_simulator(recipe, explosives), tuple(texts))
+    energy = np.array([entry.density * entry.heat_of_explosion for entry in explosives])
+    return Domain(recipe, blast_simulator(recipe, explosives), tuple(texts), energy)
 
 
 def _quantiles(spec: VariableSpec, shares: Floats) -> Floats:
