@@ -1,0 +1,105 @@
+"""Independent pieces of work, some at a time, each in a process of its own on one BLAS thread.
+
+The numbers do not depend on how many run at once: a piece gets its inputs and returns its result,
+and results come back in the order of the pieces.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from dataclasses import dataclass
+from typing import Any
+
+from castblast.progress import ProgressCallback, silent
+
+
+@dataclass(frozen=True)
+class Job:
+    """One piece of work.
+
+    Attributes
+    ----------
+    label : str
+        For people.
+    function : callable
+        Importable by its name; called with `arguments`. Runs in another process unless it is
+        the only one at a time, so arguments and result must be picklable.
+    arguments : tuple
+    keep : callable, optional
+        Told the result, in this process, as soon as it is there: what is kept survives a stop.
+    """
+
+    label: str
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...] = ()
+    keep: Callable[[Any], None] | None = None
+
+
+def run_jobs(
+    jobs: Sequence[Job], workers: int | None = None, progress: ProgressCallback = silent
+) -> list[Any]:
+    """Run jobs and give their results in order.
+
+    Parameters
+    ----------
+    jobs : sequence of Job
+    workers : int, optional
+        Processes at a time; None: the cores there are. With one, everything runs in this process.
+    progress : callable
+        Told when a job ends.
+
+    Raises
+    ------
+    Whatever a job raises; the others are stopped.
+    """
+    count = min(len(jobs), workers or available_cores())
+    if count <= 1:
+        return [_run_here(job, number, len(jobs), progress) for number, job in enumerate(jobs)]
+    others = set(multiprocessing.active_children())
+    with ProcessPoolExecutor(count, multiprocessing.get_context("spawn")) as pool:
+        try:
+            return _collect(pool, jobs, progress)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in set(multiprocessing.active_children()) - others:
+                process.terminate()
+            raise
+
+
+def available_cores() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _run_here(job: Job, number: int, count: int, progress: ProgressCallback) -> Any:
+    progress(number / count, job.label)
+    result = job.function(*job.arguments)
+    if job.keep is not None:
+        job.keep(result)
+    return result
+
+
+def _collect(
+    pool: ProcessPoolExecutor, jobs: Sequence[Job], progress: ProgressCallback
+) -> list[Any]:
+    futures: dict[Future[Any], int] = {
+        pool.submit(job.function, *job.arguments): number for number, job in enumerate(jobs)
+    }
+    results: list[Any] = [None] * len(jobs)
+    left = set(futures)
+    progress(0.0, jobs[0].label)
+    while left:
+        done, left = wait(left, timeout=1.0, return_when=FIRST_COMPLETED)
+        for future in done:
+            number = futures[future]
+            results[number] = future.result()
+            keep = jobs[number].keep
+            if keep is not None:
+                keep(results[number])
+            progress(1.0 - len(left) / len(jobs), f"{jobs[number].label}: done")
+    return results

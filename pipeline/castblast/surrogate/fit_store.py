@@ -1,0 +1,118 @@
+"""Finished fits kept on disk, so that the same spec on the same rows is never fitted twice.
+
+A working store like compiled code, not a format of exchange: it holds pickled estimators, is read
+by the version that wrote it only, and must not be taken from strangers. ``network.json`` travels.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from castblast import __version__
+from castblast.files import write_with
+from castblast.specs.model import ModelSpec
+from castblast.surrogate.features import Table
+from castblast.surrogate.training import Fit
+
+#: Modules of this folder that look at fits but have no part in making one.
+_OBSERVERS = (
+    "comparison", "gate", "shifts", "strata", "learning", "sensitivity", "tuning", "tuning_space",
+    "study_file", "tracking", "lab_book", "infill",
+)  # fmt: skip
+_LIBRARIES = ("numpy", "scikit-learn", "torch")
+_PACKAGE = Path(__file__).resolve().parent.parent
+
+FitKey = dict[str, str]
+
+
+def table_hash(table: Table) -> str:
+    """SHA-256 (hex) of the rows as a fit sees them: values, explosives, split."""
+    digest = hashlib.sha256()
+    for name in table.feature_names:
+        digest.update(name.encode())
+        digest.update(np.ascontiguousarray(table.frame[name].to_numpy(dtype=np.float64)))
+    digest.update(" ".join(table.target_names).encode())
+    digest.update(np.ascontiguousarray(table.targets, dtype=np.float64))
+    for labels in (table.frame["explosive"], table.split):
+        digest.update("\n".join(map(str, labels)).encode())
+    return digest.hexdigest()
+
+
+def fit_key(spec: ModelSpec, table: Table) -> FitKey:
+    """Everything that a fit is made from: spec, rows, code and libraries."""
+    own = table.select(spec.features, spec.targets)
+    return {
+        "castblast": __version__,
+        "spec": spec.sha256(),
+        "name": spec.name,
+        "description": spec.description,
+        "dataset": table.source.get("content_sha256", ""),
+        "rows": table_hash(own),
+        "code": _code_hash(),
+        "factory": _factory_hash(getattr(spec, "factory", None)),
+        **{library: _version(library) for library in _LIBRARIES},
+    }
+
+
+@cache
+def _code_hash() -> str:
+    """SHA-256 over the sources that turn a spec and rows into a fit."""
+    sources = [
+        path for path in (_PACKAGE / "surrogate").glob("*.py") if path.stem not in _OBSERVERS
+    ]
+    sources += [*(_PACKAGE / "specs").glob("model*.py"), *(_PACKAGE / "network").glob("*.py")]
+    digest = hashlib.sha256()
+    for path in sorted(sources):
+        digest.update(path.relative_to(_PACKAGE).as_posix().encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def _factory_hash(factory: str | None) -> str:
+    """SHA-256 of the module of a user's own ``module:factory``; empty where there is none."""
+    if not factory:
+        return ""
+    try:
+        found = find_spec(factory.partition(":")[0])
+    except (ImportError, ValueError):
+        return ""
+    if found is None or not found.origin or not Path(found.origin).is_file():
+        return ""
+    return hashlib.sha256(Path(found.origin).read_bytes()).hexdigest()
+
+
+def _version(library: str) -> str:
+    try:
+        return version(library)
+    except PackageNotFoundError:
+        return ""
+
+
+def save_fit(path: Path, fit: Fit, key: FitKey) -> bool:
+    """Keep a fit; False where its estimator cannot be pickled, which a user's own may not."""
+    try:
+        content = pickle.dumps({"key": key, "fit": fit}, protocol=5)
+    except (pickle.PicklingError, AttributeError, TypeError):
+        return False
+    write_with(path, lambda name: name.write_bytes(content))
+    return True
+
+
+def load_fit(path: Path, key: FitKey) -> Fit | None:
+    """Give the fit that was made from exactly `key`; None if there is none or it is unreadable."""
+    try:
+        stored: Any = pickle.loads(path.read_bytes())
+    except Exception:  # whatever a damaged or older file raises: the fit is made again
+        return None
+    if not isinstance(stored, dict) or stored.get("key") != key:
+        return None
+    fit = stored.get("fit")
+    return fit if isinstance(fit, Fit) else None

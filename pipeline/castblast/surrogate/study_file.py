@@ -1,0 +1,71 @@
+"""One process at a time works on the file of a study, and a killed one leaves it usable.
+
+The lock belongs to the process, so the kernel drops it whatever becomes of the process. What a
+killed process may leave behind, half a line at the end of the file and the lock of a single write,
+is cleared by the next one that holds the study.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO
+
+from castblast.errors import SpecError
+
+#: How every record of a journal begins.
+_RECORD = b'{"op_code":'
+
+
+@contextmanager
+def hold_study(journal: Path) -> Iterator[None]:
+    """Hold the file of a study for this process.
+
+    Raises
+    ------
+    SpecError
+        Another process holds it, it is a folder, or its end is none of a journal.
+    OSError
+        The folder cannot be written to.
+    """
+    if journal.is_dir():
+        message = f"{journal}: is a folder; a file for the study is needed"
+        raise SpecError(message)
+    journal.parent.mkdir(parents=True, exist_ok=True)
+    guard = journal.with_name(f".{journal.name}.held")
+    with guard.open("w", encoding="utf-8") as stream:
+        if not _lock(stream):
+            message = f"{journal}: another process is at work on this study"
+            raise SpecError(message)
+        journal.with_name(f"{journal.name}.lock").unlink(missing_ok=True)
+        _drop_half_line(journal)
+        yield
+
+
+def _lock(stream: IO[str]) -> bool:
+    """Lock an open file for this process; where the system has no such locks nothing is held."""
+    try:
+        import fcntl
+    except ImportError:
+        return True
+    try:
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
+
+
+def _drop_half_line(journal: Path) -> None:
+    """Cut off what follows the last line end: a record that was never written whole."""
+    if not journal.is_file():
+        return
+    with journal.open("r+b") as stream:
+        content = stream.read()
+        whole = content.rfind(b"\n") + 1
+        if whole == len(content):
+            return
+        if not content[whole:].startswith(_RECORD[: len(content) - whole]):
+            message = f"{journal}: is no journal of a study, or a damaged one"
+            raise SpecError(message)
+        stream.truncate(whole)
