@@ -4,8 +4,11 @@ The graph is put together with `onnx.helper`: converters of whole scikit-learn p
 transformed targets and fall back to float32. Opset 13 and IR 7 load in runtimes since 2021.
 
 Inputs: ``numeric`` float64 [n, k] in SI, columns in the order of the metadata entry ``inputs``;
-``explosive`` int64 [n], positions in the entry ``explosives``. Outputs: one float64 [n] per
-output, under its own name, SI. The metadata carry units, domain box, rules and error bands.
+``explosive`` int64 [n], positions in the entry ``explosives``. Outputs, all [n], SI: one float64
+per output under its own name; the ends of its 95 % band, ``NAME_lower`` and ``NAME_upper``; for a
+network with members ``NAME_spread``, their relative standard deviation; ``domain_score`` float64,
+at most 1 inside the joint density of the training rows (NaN without one); ``in_domain`` bool, box,
+rules and density together. The metadata carry units, domain box, rules, density and bands.
 """
 
 from __future__ import annotations
@@ -16,13 +19,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.network import Column, Floats, Layer, Network, derived_matrix
+from castblast.network import (
+    Column,
+    Constraint,
+    Floats,
+    Layer,
+    Network,
+    RowPredictions,
+    derived_matrix,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
 OPSET = 13
 _IR_VERSION = 7
+#: Code of float64 in ONNX, for `Cast`.
+_DOUBLE = 11
 _OPERATORS = {"tanh": "Tanh", "relu": "Relu", "logistic": "Sigmoid"}
 
 
@@ -66,17 +79,38 @@ class _Graph:
         x = self.add("Sub", f"{prefix}_centred", x, mean)
         return self.add("Div", f"{prefix}_scaled", x, scale)
 
-    def dense(self, x: str, number: int, layer: Layer) -> str:
-        """One layer; the last node carries its activation."""
-        weights = self.constant(f"weights_{number}", layer.weights)
-        biases = self.constant(f"biases_{number}", layer.biases)
-        x = self.add("Gemm", f"sum_{number}", x, weights, biases)
+    def chain(self, x: str, prefix: str, network: Network, layers: Sequence[Layer]) -> str:
+        """Layers, then un-scaling of the outputs: (n, m) in SI."""
+        for number, layer in enumerate(layers, 1):
+            x = self.dense(x, f"{prefix}_{number}", layer)
+        scale = self.constant(f"{prefix}_output_scale", _of(network.outputs, "scale"))
+        mean = self.constant(f"{prefix}_output_mean", _of(network.outputs, "mean"))
+        x = self.add("Mul", f"{prefix}_unscaled", x, scale)
+        x = self.add("Add", f"{prefix}_values", x, mean)
+        return self.transform("Exp", x, network.outputs)
+
+    def dense(self, x: str, label: str, layer: Layer) -> str:
+        """One layer; its last node carries the activation."""
+        weights = self.constant(f"{label}_weights", layer.weights)
+        biases = self.constant(f"{label}_biases", layer.biases)
+        x = self.add("Gemm", f"{label}_sum", x, weights, biases)
         if layer.activation == "identity":
             return x
         if layer.activation == "silu":
-            gate = self.add("Sigmoid", f"gate_{number}", x)
-            return self.add("Mul", f"node_{number}", x, gate)
-        return self.add(_OPERATORS[layer.activation], f"node_{number}", x)
+            gate = self.add("Sigmoid", f"{label}_gate", x)
+            return self.add("Mul", f"{label}_node", x, gate)
+        return self.add(_OPERATORS[layer.activation], f"{label}_node", x)
+
+    def columns(self, x: str, names: Sequence[str]) -> None:
+        """Make every column of (n, m) an output of its own."""
+        for j, name in enumerate(names):
+            position = self.constant(f"{name}_position", np.array(j, dtype=np.int64))
+            self.add("Gather", name, x, position, axis=1)
+
+    def row_sums(self, x: str, label: str) -> str:
+        """Sum along the columns: (n, m) to (n,)."""
+        axes = self.constant(f"{label}_axes", np.array([1], dtype=np.int64))
+        return self.add("ReduceSum", label, x, axes, keepdims=0)
 
 
 def to_onnx(network: Network) -> bytes:
@@ -91,34 +125,31 @@ def to_onnx(network: Network) -> bytes:
     from onnx import TensorProto, helper
 
     graph = _Graph()
-    parts = [graph.scaled("numeric", "input", network.inputs)]
+    scaled = graph.scaled("numeric", "input", network.inputs)
+    parts = [scaled]
     if network.derived:
         combination = graph.constant("derived_coefficients", derived_matrix(network))
         derived = graph.add("MatMul", "derived", "numeric", combination)
         parts.append(graph.scaled(derived, "derived", network.derived))
     codes = graph.constant("explosive_codes", network.codes)
     parts.append(graph.add("Gather", "explosive_code", codes, "explosive", axis=0))
-    x = graph.add("Concat", "features", *parts, axis=1)
-    for number, layer in enumerate(network.layers, 1):
-        x = graph.dense(x, number, layer)
-    x = graph.add("Mul", "spread", x, graph.constant("output_scale", _of(network.outputs, "scale")))
-    x = graph.add("Add", "values", x, graph.constant("output_mean", _of(network.outputs, "mean")))
-    x = graph.transform("Exp", x, network.outputs)
-    for j, name in enumerate(network.output_names):
-        position = graph.constant(f"{name}_position", np.array(j, dtype=np.int64))
-        graph.add("Gather", name, x, position, axis=1)
-    numeric = helper.make_tensor_value_info(
-        "numeric", TensorProto.DOUBLE, ["n", len(network.inputs)]
-    )
-    explosive = helper.make_tensor_value_info("explosive", TensorProto.INT64, ["n"])
-    outputs = [
-        helper.make_tensor_value_info(name, TensorProto.DOUBLE, ["n"])
-        for name in network.output_names
-    ]
+    features = graph.add("Concat", "features", *parts, axis=1)
+    values = graph.chain(features, "network", network, network.layers)
+    graph.columns(values, network.output_names)
+    _add_band(graph, values, network)
+    if network.members:
+        _add_spread(graph, values, features, network)
+    _add_domain(graph, scaled, network)
+
+    def entry(name: str, kind: int, *widths: int) -> Any:
+        return helper.make_tensor_value_info(name, kind, ["n", *widths])
+
+    inputs = [entry("numeric", TensorProto.DOUBLE, len(network.inputs))]
+    inputs.append(entry("explosive", TensorProto.INT64))
+    outputs = [entry(name, TensorProto.DOUBLE) for name in _result_names(network)]
+    outputs.append(entry("in_domain", TensorProto.BOOL))
     model = helper.make_model(
-        helper.make_graph(
-            graph.nodes, "castblast", [numeric, explosive], outputs, initializer=graph.constants
-        ),
+        helper.make_graph(graph.nodes, "castblast", inputs, outputs, initializer=graph.constants),
         producer_name="castblast",
         producer_version=str(network.provenance.get("castblast_version", "")),
         opset_imports=[helper.make_opsetid("", OPSET)],
@@ -129,7 +160,91 @@ def to_onnx(network: Network) -> bytes:
     return bytes(model.SerializeToString(deterministic=True))
 
 
-def _of(columns: Sequence[Column], attribute: str) -> Floats:
+def _result_names(network: Network) -> list[str]:
+    """Float64 outputs in their order."""
+    endings = ["", "_lower", "_upper", *(["_spread"] if network.members else [])]
+    names = [f"{name}{ending}" for ending in endings for name in network.output_names]
+    return [*names, "domain_score"]
+
+
+def _add_band(graph: _Graph, values: str, network: Network) -> None:
+    band = graph.constant("relative_band", _of(network.outputs, "relative_band"))
+    magnitude = graph.add("Abs", "magnitudes", values)
+    half = graph.add("Mul", "half_widths", magnitude, band)
+    for operator, ending in (("Sub", "lower"), ("Add", "upper")):
+        x = graph.add(operator, f"all_{ending}", values, half)
+        graph.columns(x, [f"{name}_{ending}" for name in network.output_names])
+
+
+def _add_spread(graph: _Graph, values: str, features: str, network: Network) -> None:
+    """Relative standard deviation over the network and its members."""
+    others = [
+        graph.chain(features, f"member_{number}", network, layers)
+        for number, layers in enumerate(network.members, 1)
+    ]
+    count = len(others) + 1.0
+    total = graph.add("Sum", "member_sum", values, *others)
+    mean = graph.add("Div", "member_mean", total, graph.constant("member_count", np.array(count)))
+    squares = []
+    for number, answer in enumerate((values, *others)):
+        step = graph.add("Sub", f"member_step_{number}", answer, mean)
+        squares.append(graph.add("Mul", f"member_square_{number}", step, step))
+    total = graph.add("Sum", "member_squares", *squares)
+    divisor = graph.constant("member_divisor", np.array(count - 1.0))
+    deviation = graph.add("Sqrt", "spreads", graph.add("Div", "variances", total, divisor))
+    x = graph.add("Div", "relative_spreads", deviation, "magnitudes")
+    graph.columns(x, [f"{name}_spread" for name in network.output_names])
+
+
+def _add_domain(graph: _Graph, scaled: str, network: Network) -> None:
+    """Score of the joint density, and the flag of box, rules and density."""
+    conditions = [
+        graph.add(operator, f"box_{end}", "numeric", graph.constant(end, _of(network.inputs, end)))
+        for operator, end in (("GreaterOrEqual", "lower"), ("LessOrEqual", "upper"))
+    ]
+    if network.constraints:
+        matrix = np.array(
+            [
+                [rule.coefficients.get(name, 0.0) for rule in network.constraints]
+                for name in network.input_names
+            ],
+            dtype=np.float64,
+        )
+        sums = graph.add("MatMul", "rule_sums", "numeric", graph.constant("rules", matrix))
+        least = graph.constant("rule_lower", _of(network.constraints, "lower"))
+        conditions.append(graph.add("GreaterOrEqual", "rules_kept", sums, least))
+    score = _density(graph, scaled, network)
+    if network.density is not None:
+        usual = graph.add("LessOrEqual", "usual", score, graph.constant("one", np.array([1.0])))
+        axes = graph.constant("usual_axes", np.array([1], dtype=np.int64))
+        conditions.append(graph.add("Unsqueeze", "usual_column", usual, axes))
+    table = graph.add("Concat", "conditions", *conditions, axis=1)
+    broken = graph.add("Cast", "broken", graph.add("Not", "failed", table), to=_DOUBLE)
+    half = graph.constant("half", np.array([0.5]))
+    graph.add("Less", "in_domain", graph.row_sums(broken, "faults"), half)
+
+
+def _density(graph: _Graph, scaled: str, network: Network) -> str:
+    density = network.density
+    if density is None:
+        # No value for any row, but one for every row.
+        nothing = graph.row_sums(scaled, "any_number")
+        missing = graph.constant("missing", np.array([np.nan]))
+        return graph.add("Add", "domain_score", nothing, missing)
+    distances = []
+    for j, centre in enumerate(density.centres):
+        step = graph.add("Sub", f"step_{j}", scaled, graph.constant(f"centre_{j}", centre))
+        matrix = graph.constant(f"whitening_{j}", density.whitening[j].T)
+        white = graph.add("MatMul", f"white_{j}", step, matrix)
+        total = graph.row_sums(graph.add("Mul", f"square_{j}", white, white), f"distance_{j}")
+        offset = graph.constant(f"offset_{j}", density.offsets[j : j + 1])
+        distances.append(graph.add("Add", f"term_{j}", total, offset))
+    least = graph.add("Min", "least_term", *distances)
+    threshold = graph.constant("threshold", np.array([density.threshold]))
+    return graph.add("Div", "domain_score", least, threshold)
+
+
+def _of(columns: Sequence[Column | Constraint], attribute: str) -> Floats:
     return np.array([getattr(column, attribute) for column in columns], dtype=np.float64)
 
 
@@ -146,6 +261,8 @@ def _metadata(network: Network) -> dict[str, str]:
         "explosives": list(network.explosives),
         "outputs": list(network.output_names),
         "output_units": [column.unit for column in network.outputs],
+        "density": network.density
+        and {"threshold": network.density.threshold, "level": network.density.level},
         "relative_band": [column.relative_band for column in network.outputs],
         "provenance": dict(network.provenance),
     }
@@ -153,6 +270,11 @@ def _metadata(network: Network) -> dict[str, str]:
 
 
 def run_onnx(model: bytes, numeric: Floats, index: NDArray[np.int64]) -> Floats:
+    """Values (n, m) of an ONNX file for SI rows (n, k), in the order of its outputs."""
+    return run_onnx_rows(model, numeric, index).values
+
+
+def run_onnx_rows(model: bytes, numeric: Floats, index: NDArray[np.int64]) -> RowPredictions:
     """Evaluate an ONNX file: with onnxruntime on one thread, or with the reference of ONNX.
 
     Parameters
@@ -161,24 +283,32 @@ def run_onnx(model: bytes, numeric: Floats, index: NDArray[np.int64]) -> Floats:
         Contents of the file.
     numeric : (n, k) float64, SI
     index : (n,) int64
-
-    Returns
-    -------
-    (n, m) float64, SI, in the order of the model's outputs.
     """
     rows = {"numeric": numeric, "explosive": index}
     try:
         import onnxruntime
     except ImportError:
-        return np.stack(_reference_columns(model, rows), axis=1)
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = 1
-    session = onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
-    return np.stack(session.run(None, rows), axis=1)
+        names, columns = _reference_columns(model, rows)
+    else:
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = 1
+        session = onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
+        names = [entry.name for entry in session.get_outputs()]
+        columns = session.run(None, rows)
+    found = dict(zip(names, columns, strict=True))
+    outputs = [name.removesuffix("_lower") for name in names if name.endswith("_lower")]
+    values, lower, upper = (
+        np.stack([found[f"{name}{ending}"] for name in outputs], axis=1)
+        for ending in ("", "_lower", "_upper")
+    )
+    return RowPredictions(values, lower, upper, found["domain_score"], found["in_domain"])
 
 
-def _reference_columns(model: bytes, rows: dict[str, NDArray[Any]]) -> list[Floats]:
-    """Outputs by the evaluator that comes with the format: slow, and right by definition."""
+def _reference_columns(
+    model: bytes, rows: dict[str, NDArray[Any]]
+) -> tuple[list[str], list[NDArray[Any]]]:
+    """Names and outputs by the evaluator that comes with the format: slow, right by definition."""
     from onnx.reference import ReferenceEvaluator
 
-    return list(ReferenceEvaluator(model).run(None, rows))
+    evaluator = ReferenceEvaluator(model)
+    return list(evaluator.output_names), list(evaluator.run(None, rows))

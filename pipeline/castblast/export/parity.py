@@ -1,7 +1,8 @@
 """Is an export the same function as the fitted estimator? Run it on the golden rows and say.
 
 The golden rows of a network carry the answers of the estimator itself and reach into the corners
-of the training box, so a wrong transform, a swapped column or a lost digit shows.
+of the training box, so a wrong transform, a swapped column or a lost digit shows. The ends of the
+band, the density score and the domain flag of a copy are held against those of `predict_rows`.
 """
 
 from __future__ import annotations
@@ -14,11 +15,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from castblast.export.json_file import from_json
-from castblast.export.onnx_file import run_onnx
-from castblast.network import Floats, Network, evaluate_rows, explosive_index
+from castblast.export.onnx_file import run_onnx_rows
+from castblast.network import (
+    Floats,
+    Network,
+    RowPredictions,
+    density_score,
+    explosive_index,
+    in_domain,
+    predict_rows,
+)
 
 #: Largest relative deviation allowed for a float64 export.
 TOLERANCE = 1e-12
+#: The same for the density score: its sums of squares lose a few digits between tied inputs.
+SCORE_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -35,9 +46,15 @@ class ParityReport:
         Largest deviations. The relative one is over the larger of the value and the standard
         deviation of the golden answers: near a zero of the output only rounding is left.
     tolerance : float
-        Bound on `relative`.
+        Bound on `relative` and `band`.
     remark : str
         Why the export was not run, if it was not.
+    band : float
+        Largest deviation of the ends of the 95 % bands, relative as above.
+    score : float
+        Largest deviation of the density score, over the larger of the score and 1.
+    flags : int
+        Rows whose domain flag differs.
     """
 
     target: str
@@ -46,6 +63,9 @@ class ParityReport:
     relative: Mapping[str, float]
     tolerance: float = TOLERANCE
     remark: str = ""
+    band: float = 0.0
+    score: float = 0.0
+    flags: int = 0
 
     @property
     def verified(self) -> bool:
@@ -55,7 +75,22 @@ class ParityReport:
     @property
     def passed(self) -> bool:
         """Whether it was run and every deviation is within the tolerance; NaN is not."""
-        return self.verified and all(value <= self.tolerance for value in self.relative.values())
+        return self.verified and not self.faults
+
+    @property
+    def faults(self) -> list[str]:
+        """Every deviation beyond its bound, one line each; NaN is beyond."""
+        bounds = {name: (value, self.tolerance) for name, value in self.relative.items()}
+        bounds["95 % band"] = (self.band, self.tolerance)
+        bounds["density score"] = (self.score, SCORE_TOLERANCE)
+        lines = [
+            f"{name} deviates by {value:.3g} relative, allowed is {bound:g}"
+            for name, (value, bound) in bounds.items()
+            if not value <= bound
+        ]
+        if self.flags:
+            lines.append(f"the domain flag differs in {self.flags} of {self.rows} rows")
+        return lines
 
     def to_document(self) -> dict[str, Any]:
         """Give the report as plain JSON values."""
@@ -66,21 +101,24 @@ class ParityReport:
             "tolerance": self.tolerance,
             "absolute": dict(self.absolute),
             "relative": dict(self.relative),
+            "band": self.band,
+            "density_score": self.score,
+            "flags_that_differ": self.flags,
             **({"remark": self.remark} if self.remark else {}),
         }
 
 
-Runner = Callable[[bytes, Floats, NDArray[np.int64]], Floats | None]
+Runner = Callable[[bytes, Floats, NDArray[np.int64]], RowPredictions | None]
 
 
-def _run_json(contents: bytes, numeric: Floats, index: NDArray[np.int64]) -> Floats:
-    return evaluate_rows(from_json(contents.decode()), numeric, index)
+def _run_json(contents: bytes, numeric: Floats, index: NDArray[np.int64]) -> RowPredictions:
+    return predict_rows(from_json(contents.decode()), numeric, index)
 
 
 #: How each export is run: file contents and rows in, outputs out; None if that cannot be done here.
 RUNNERS: dict[str, tuple[Runner, str]] = {
     "json": (_run_json, ""),
-    "onnx": (run_onnx, ""),
+    "onnx": (run_onnx_rows, ""),
 }
 
 
@@ -105,16 +143,22 @@ def check_parity(network: Network, target: str, contents: bytes) -> ParityReport
     return compare_outputs(network, target, found)
 
 
-def compare_outputs(network: Network, target: str, found: Floats) -> ParityReport:
-    """Hold outputs (n, m) of the golden rows against the stored answers."""
-    truth = network.golden.outputs
-    deviation = np.abs(found - truth)
-    spread = np.std(truth, axis=0)
-    relative = deviation / np.maximum(np.abs(truth), spread)
-    names = network.output_names
+def compare_outputs(network: Network, target: str, found: RowPredictions) -> ParityReport:
+    """Hold the answers for the golden rows against the stored ones and their band and domain."""
+    truth, names = network.golden.outputs, network.output_names
+    deviation = np.abs(found.values - truth)
+    size = np.maximum(np.abs(truth), np.std(truth, axis=0))
+    half = np.abs(truth) * np.array([column.relative_band for column in network.outputs])
+    band = np.maximum(np.abs(found.lower - (truth - half)), np.abs(found.upper - (truth + half)))
+    score = density_score(network, network.golden.inputs)
+    drift = np.abs(found.score - score) / np.maximum(score, 1.0)
+    inside = in_domain(network, network.golden.inputs)
     return ParityReport(
         target,
         len(truth),
         dict(zip(names, deviation.max(axis=0).tolist(), strict=True)),
-        dict(zip(names, relative.max(axis=0).tolist(), strict=True)),
+        dict(zip(names, (deviation / size).max(axis=0).tolist(), strict=True)),
+        band=float((band / size).max()),
+        score=0.0 if network.density is None else float(drift.max()),
+        flags=int(np.count_nonzero(found.inside != inside)),
     )

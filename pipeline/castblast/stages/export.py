@@ -135,10 +135,10 @@ def _verify(network: Network, contents: dict[str, bytes]) -> dict[str, Any]:
         target: check_parity(network, target, content) for target, content in contents.items()
     }
     faults = [
-        f"{target}: {name} deviates by {value:.3g} relative, allowed is {report.tolerance:g}"
+        f"{target}: {line}"
         for target, report in reports.items()
-        for name, value in report.relative.items()
-        if not value <= report.tolerance
+        if report.verified
+        for line in report.faults
     ]
     if faults:
         raise CheckError("\n".join(faults))
