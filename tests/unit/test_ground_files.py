@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from math import inf, pi
 
 import numpy as np
@@ -162,4 +163,7 @@ def test_a_wall_that_cuts_balls_is_named():
     assert any("facet" in line for line in faults)
     ends = np.array([-1.0, 2.0])
     buried = wall_faults(heightmap(ends, ends, np.full((2, 2), 0.95), base=-inf), balls)
-    assert any("20 balls lie below" in line or "25 balls lie below" in line for line in buried)
+    # Those that the ground holds count as cut, those deeper as below it.
+    counted = [int(re.search(r"(\d+) balls? of the packing", line)[1]) for line in buried]
+    assert sum(counted) == 25
+    assert any("below the ground" in line for line in buried)

@@ -11,9 +11,11 @@ import pytest
 import yaml
 
 from castblast.errors import SpecError
-from castblast.muckpile.initial_state import wall_faults
+from castblast.muckpile.contact import ContactLaw
+from castblast.muckpile.initial_state import initial_state, pressed_share
 from castblast.muckpile.particles import particles_at_rest
 from castblast.muckpile.state import estimate_memory
+from castblast.muckpile.terrain import wall_faults
 from castblast.muckpile.walls import floor, join, plane, rectangle
 from castblast.specs.ball_files import read_balls
 from castblast.stages import muckpile_memory
@@ -190,13 +192,32 @@ def test_a_wall_that_cuts_the_balls_is_refused(tmp_path: Path) -> None:
 def test_depth_in_walls() -> None:
     """Planes hold balls at any depth; behind a bounded wall is another place; a shelf cuts none."""
     balls = particles_at_rest([[0, 0, 1], [3, 0, 0.9], [0, 0, -9.0]], [1, 1, 1])
-    assert (
-        wall_faults(balls._replace(position=balls.position[:2], radius=balls.radius[:2]), floor())
-        == []
-    )
-    assert "cuts 1 ball of the packing; worst: ball 2" in wall_faults(balls, floor())[0]
+    first = balls._replace(position=balls.position[:2], radius=balls.radius[:2])
+    assert wall_faults(floor(), first) == []
+    assert "cuts 1 ball of the packing; worst: ball 2" in wall_faults(floor(), balls)[0]
     side = plane((2.5, 0, 0), (1, 0, 0))
-    faults = wall_faults(balls, join(floor(-20.0), side))
+    faults = wall_faults(join(floor(-20.0), side), balls)
     assert "wall 1 cuts 3 balls" in faults[0]
     shelf = rectangle((0, 0, 5.0), (1, 0, 0), (0, 1, 0), (-1, 1, -1, 1))
-    assert "the ground cuts 2 balls" in wall_faults(balls, join(floor(-20.0), shelf))[0]
+    assert (
+        "2 balls of the packing below the ground"
+        in wall_faults(join(floor(-20.0), shelf), balls)[0]
+    )
+
+
+def test_overlaps_that_weight_explains_are_none() -> None:
+    """A column of balls, each 15 % of the radius into the next, on a modulus of 1 MPa.
+
+    The foot of 12 m of rock may be pressed so far, its top may not; without a law nothing may.
+    """
+    place = [[0.0, 0.0, 0.5 + 0.925 * k] for k in range(14)]
+    soft, usual = ContactLaw(effective_modulus=1e6), ContactLaw()
+    top, foot = place[-3:], place[:3]
+    assert "by 15 %" in initial_state(place, [0.5] * 14)[1][0]
+    assert "2 pairs" in initial_state(top, [0.5] * 3, law=usual)[1][0]
+    allowed = pressed_share(particles_at_rest(place, [0.5] * 14), soft)
+    assert allowed[-1] == 0.10
+    assert allowed[0] == pytest.approx(25.0 * 0.6 * 2600.0 * 9.81 * 0.925 * 13 / 1e6)
+    pressed = [*foot, place[-1]]
+    assert initial_state(pressed, [0.5] * 4, law=soft)[1] == []
+    assert "balls 0 and 1" in initial_state(pressed, [0.5] * 4)[1][0]

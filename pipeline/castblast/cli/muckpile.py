@@ -9,6 +9,7 @@ import typer
 from castblast.cli.options import OutFolder
 from castblast.cli.screen import Screen
 from castblast.cli.verb import verb
+from castblast.errors import SpecError
 
 if TYPE_CHECKING:
     from castblast.stages.muckpile_results import MuckpileOutcome
@@ -72,18 +73,35 @@ def muckpile(
     frame_interval: Annotated[
         str, typer.Option(help="Simulated time between two frames.")
     ] = "0.1 s",
+    lammps: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Write the packed bench as input for LAMMPS instead of throwing it.",
+            show_default=False,
+        ),
+    ] = None,
+    liggghts: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="The same for LIGGGHTS.", show_default=False),
+    ] = None,
 ) -> Mapping[str, Any]:
     """Pack, fire and settle a bench; writes final state, profile, pictures and metrics."""
     from castblast.stages.muckpile import run_muckpile
     from castblast.stages.muckpile_compare import run_seeds
+    from castblast.stages.muckpile_deck import Decks
     from castblast.stages.muckpile_extras import Extras
 
+    decks = Decks(lammps, liggghts)
+    if decks.wanted and seeds > 1:
+        raise SpecError("--seeds: a deck is written of one seed; leave --seeds out")
     options: dict[str, Any] = {
         "balls": balls,
         "threads": threads,
         "velocity": velocity,
         "packings": packings,
         "extras": Extras(ore, dig_block, flitch, animation, vtk, vtkhdf, frame_interval),
+        "decks": decks,
     }
     with screen.progress("muckpile") as progress:
         if seeds > 1:

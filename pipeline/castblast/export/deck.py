@@ -196,8 +196,11 @@ def sample_steps(case: CastCase, step: float) -> int:
     return max(1, round(case.sample_interval / step))
 
 
-def rest_lines(case: CastCase, firings: Firings, step: float) -> Iterator[str]:
-    """Run in pieces of a sample until the translational energy has stayed low long enough."""
+def ending_lines(case: CastCase, firings: Firings, step: float, steps: int) -> Iterator[str]:
+    """Run `steps` steps if they are not 0; otherwise until the translational energy stays low."""
+    if steps > 0:
+        yield f"run {steps}"
+        return
     piece = sample_steps(case, step)
     start = round(float(firings.time[-1]) / step) if len(firings.time) else 0
     longest = max(start + 1, int(case.max_time / step))

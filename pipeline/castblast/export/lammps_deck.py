@@ -26,10 +26,10 @@ from castblast.export.deck import (
     RadiusTypes,
     atom_lines,
     deck_types,
+    ending_lines,
     firing_lines,
     pair_stiffness,
     plan_firings,
-    rest_lines,
     sample_steps,
     time_step,
 )
@@ -43,7 +43,9 @@ from castblast.muckpile.particles import FloatArray
 _TSUJI = (1.2728, -4.2783, 11.087, -22.348, 27.467, -18.022, 4.8218)
 
 
-def write_lammps_deck(folder: Path, case: CastCase, *, radius_bins: int = 10) -> list[Path]:
+def write_lammps_deck(
+    folder: Path, case: CastCase, *, radius_bins: int = 10, steps: int = 0
+) -> list[Path]:
     """Write `balls.data` and `cast.in` into `folder`.
 
     Parameters
@@ -54,6 +56,8 @@ def write_lammps_deck(folder: Path, case: CastCase, *, radius_bins: int = 10) ->
         Types of radius. A case with no more distinct radii has one type for each, and then its
         stiffnesses are exact; otherwise ten types leave an rms error of 6 per cent in the
         stiffness of single contacts and of less than one in the mean.
+    steps : int
+        Run so many steps after the last firing and end there; 0: until the pile is at rest.
 
     Raises
     ------
@@ -62,10 +66,10 @@ def write_lammps_deck(folder: Path, case: CastCase, *, radius_bins: int = 10) ->
     """
     types = deck_types("LAMMPS", case, radius_bins, deck_faults(case))
     firings = plan_firings(case)
-    step = time_step(case, firings)
+    lines = _input_lines(case, types, firings, steps)
     return [
         write_text(folder / "balls.data", "\n".join(_data_lines(case, types, firings)) + "\n"),
-        write_text(folder / "cast.in", "\n".join(_input_lines(case, types, firings, step)) + "\n"),
+        write_text(folder / "cast.in", "\n".join(lines) + "\n"),
     ]
 
 
@@ -109,11 +113,10 @@ def _data_lines(case: CastCase, types: RadiusTypes, firings: Firings) -> Iterato
         yield f"{k + 1} {number}"
 
 
-def _input_lines(
-    case: CastCase, types: RadiusTypes, firings: Firings, step: float
-) -> Iterator[str]:
+def _input_lines(case: CastCase, types: RadiusTypes, firings: Firings, steps: int) -> Iterator[str]:
     """Lines of the input script."""
     radius, law = types.radius, case.law
+    step = time_step(case, firings)
     yield "# A cast written by castblast: mpirun lmp -in cast.in"
     yield "units si\natom_style sphere\natom_modify map array\nboundary s s s\nnewton off"
     yield "comm_modify vel yes\nprocessors * * 1"
@@ -142,7 +145,7 @@ def _input_lines(
         every = max(1, round(case.snapshot_interval / step))
         yield f"dump frames all custom {every} frames.dump id type diameter x y z vx vy vz mol"
     yield from firing_lines(case, firings, step, lambda number: f"molecule {number}")
-    yield from rest_lines(case, firings, step)
+    yield from ending_lines(case, firings, step, steps)
     yield (
         "write_dump all custom final.dump id type diameter x y z vx vy vz "
         "omegax omegay omegaz mol modify sort id"

@@ -25,10 +25,10 @@ from castblast.export.deck import (
     RadiusTypes,
     atom_lines,
     deck_types,
+    ending_lines,
     firing_lines,
     pair_stiffness,
     plan_firings,
-    rest_lines,
     sample_steps,
     time_step,
 )
@@ -139,10 +139,7 @@ def _input_lines(
         every = max(1, round(case.snapshot_interval / step))
         yield f"dump frames all custom {every} frames.dump id type radius x y z vx vy vz"
     yield from firing_lines(case, firings, step, members)
-    if steps > 0:
-        yield f"run {steps}"
-    else:
-        yield from rest_lines(case, firings, step)
+    yield from ending_lines(case, firings, step, steps)
     yield (
         "dump final all custom 1 final.dump id type radius x y z vx vy vz omegax omegay omegaz\n"
         "dump_modify final sort id\nrun 0"

@@ -128,7 +128,10 @@ def joint_factor(
     dip: Literal["out_of_face", "along_face", "into_face"],
     condition: Literal["tight", "relaxed", "filled"] = "tight",
 ) -> float:
-    """Joint factor of jointed rock (Cunningham 2005).
+    """Joint factor of jointed rock: spacing and condition after Cunningham (2005).
+
+    The values of the dip are those of Lilly (1986) and Cunningham (1987), also in Ouchterlony
+    (2005); the print of 2005 has those of `out_of_face` and `into_face` exchanged.
 
     Parameters
     ----------

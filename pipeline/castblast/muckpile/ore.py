@@ -207,9 +207,9 @@ def densest_area(position: FloatArray, radius: FloatArray, share: float, cell: f
     """Smallest area in plan that holds a share of the mass of balls.
 
     Mass per area is counted on a square grid and smoothed by a Gaussian of one cell (SciPy). The
-    contour (contourpy) is at the density that the stated share of the mass exceeds where it lies
-    (Hyndman 1996). Where the density is even, as
-    in an undisturbed bench, any part of it would do, and the smoothing chooses the inner one.
+    contour (contourpy) is at the density that the stated share of the mass exceeds where it lies:
+    the highest density region of Hyndman (1996). Where the density is even, as in an undisturbed
+    bench, any part of it would do, and the smoothing chooses the inner one.
 
     Parameters
     ----------

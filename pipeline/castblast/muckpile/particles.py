@@ -102,15 +102,15 @@ def centre_of_mass(particles: Particles) -> FloatArray:
     return np.asarray(weight @ particles.position / weight.sum())
 
 
-def check_particles(particles: Particles, overlap_share: float = 0.10) -> list[str]:
+def check_particles(particles: Particles, overlap_share: float | FloatArray = 0.10) -> list[str]:
     """Return every fault of a state in words; an empty list means that it can be simulated.
 
     Parameters
     ----------
     particles : Particles
-    overlap_share : float [-]
-        Largest overlap of two balls over their mean radius. Balls at rest under their own weight
-        overlap by a few per cent; much more would throw them apart.
+    overlap_share : float or array (n,) [-]
+        Largest overlap of two balls over their mean radius; of two limits the larger holds. Balls
+        at rest under their own weight overlap by a few per cent; much more would throw them apart.
     """
     faults = []
     radius = particles.radius
@@ -128,7 +128,7 @@ def check_particles(particles: Particles, overlap_share: float = 0.10) -> list[s
     return _overlap_faults(particles, overlap_share)
 
 
-def _overlap_faults(particles: Particles, overlap_share: float) -> list[str]:
+def _overlap_faults(particles: Particles, overlap_share: float | FloatArray) -> list[str]:
     from scipy.spatial import cKDTree
 
     radius = particles.radius
@@ -139,12 +139,14 @@ def _overlap_faults(particles: Particles, overlap_share: float) -> list[str]:
     distance = np.linalg.norm(particles.position[first] - particles.position[second], axis=1)
     radii = radius[first] + radius[second]
     share = 2.0 * (radii - distance) / radii
-    bad = np.flatnonzero(share > overlap_share)
+    limits = np.broadcast_to(overlap_share, radius.shape)
+    limit = np.maximum(limits[first], limits[second])
+    bad = np.flatnonzero(share > limit)
     if not len(bad):
         return []
-    worst = bad[np.argmax(share[bad])]
+    worst = bad[np.argmax(share[bad] / limit[bad])]
     return [
-        f"{len(bad)} pairs of balls overlap by more than {100.0 * overlap_share:.0f} % of their "
+        f"{len(bad)} pairs of balls overlap by more than {100.0 * limit[worst]:.0f} % of their "
         f"mean radius; worst: balls {first[worst]} and {second[worst]} by "
         f"{100.0 * share[worst]:.0f} %"
     ]

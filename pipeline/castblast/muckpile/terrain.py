@@ -13,10 +13,11 @@ from numpy.typing import ArrayLike
 
 from castblast.kernel import kernel
 from castblast.muckpile.facet_table import corner_numbers, edge_numbers
-from castblast.muckpile.facets import WallTable, facet_height
+from castblast.muckpile.facets import WallTable
 from castblast.muckpile.particles import FloatArray, IntArray, Particles
 from castblast.muckpile.walls import (
     Walls,
+    ground_height,
     near_walls,
     surface,
     wall_distance,
@@ -174,45 +175,68 @@ def _line(bad: IntArray, what: str) -> str:
     return f"facets {what}: facet {named}{more}"
 
 
-def wall_faults(walls: Walls, particles: Particles, share: float = CUT_SHARE) -> list[str]:
+def wall_faults(
+    walls: Walls, particles: Particles, share: float | FloatArray = CUT_SHARE
+) -> list[str]:
     """Say which walls cut into balls, or lie above balls, at the start; empty: none.
+
+    What counts is the overlap that the simulation would feel, rims of walls and edges of facets
+    included.
 
     Parameters
     ----------
     walls : Walls
     particles : Particles
-    share : float [-]
-        Largest overlap of a ball with a wall over its radius. Balls at rest at a wall overlap with
-        it by a few per cent.
+    share : float or array (n,) [-]
+        Largest overlap of a ball with a wall over its radius; see
+        `castblast.muckpile.initial_state.pressed_share`.
     """
     table = wall_table(walls, 0.0, 0.0)
     place = np.ascontiguousarray(np.column_stack([particles.position, particles.radius]))
     cut, deepest = _cuts(table, place)
     planes = len(walls.origin)
+    bad = deepest > share
     faults = []
-    for k in np.unique(cut[deepest > share]):
-        touched = np.flatnonzero((cut == k) & (deepest > share))
-        worst = touched[np.argmax(deepest[touched])]
+    for k in np.unique(cut[bad]):
+        touched = np.flatnonzero((cut == k) & bad)
+        worst = int(touched[np.argmax(deepest[touched])])
         name = f"wall {k}" if k < planes else f"facet {k - planes}"
+        depth = deepest[worst] * particles.radius[worst]
         faults.append(
-            f"{name} cuts {len(touched)} of the balls; worst: ball {worst} at "
-            f"{_place(particles, worst)} by {100.0 * deepest[worst]:.0f} % of its radius"
+            f"{name} cuts {_counted(touched)} of the packing; worst: ball {worst} at "
+            f"{_place(particles, worst)}, {depth:.2g} m deep with a radius of "
+            f"{particles.radius[worst]:.2g} m"
         )
         if len(faults) == _NAMED:
             faults.append("more walls cut balls")
             break
-    solid = walls.corner[walls.facet_depth >= GROUND_DEPTH]
-    if len(solid):
-        top = np.full(len(particles.radius), -inf)
-        x, y, z = np.ascontiguousarray(particles.position.T)
-        facet_height(wall_table(surface(solid), 0.0, 0.0), x, y, top)
-        under = np.flatnonzero(z < top)
-        if len(under):
-            faults.append(
-                f"{len(under)} balls lie below the ground; first: ball {under[0]} at "
-                f"{_place(particles, int(under[0]))}"
-            )
+    under = np.flatnonzero(~bad & (particles.position[:, 2] < _ground(walls, particles)))
+    if len(under):
+        faults.append(
+            f"{_counted(under)} of the packing below the ground; first: ball {under[0]} at "
+            f"{_place(particles, int(under[0]))}"
+        )
     return faults
+
+
+def _ground(walls: Walls, particles: Particles) -> FloatArray:
+    """Height (n,) [m] of the rock below which no ball can be; a sheet of facets is no such rock."""
+    sheet = walls.facet_depth < GROUND_DEPTH
+    rock = walls._replace(
+        **{
+            name: getattr(walls, name)[~sheet]
+            for name in walls._fields
+            if name == "corner" or name.startswith("facet_")
+        }
+    )
+    lowest = (particles.position[:, 2] - particles.radius).min()
+    height = ground_height(rock, particles.position[:, 0], particles.position[:, 1])
+    # `ground_height` says 0 where there is nothing.
+    return np.where(height == 0.0, min(lowest, 0.0), height)
+
+
+def _counted(balls: IntArray) -> str:
+    return f"{len(balls)} ball{'s' if len(balls) > 1 else ''}"
 
 
 def _place(particles: Particles, ball: int) -> str:

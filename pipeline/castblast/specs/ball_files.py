@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from castblast.errors import SpecError, nearest_name
+from castblast.muckpile.contact import ContactLaw
 from castblast.muckpile.initial_state import initial_state
 from castblast.muckpile.particles import FloatArray, Particles
 from castblast.specs.table import read_table
@@ -18,7 +19,7 @@ _PLACE, _MOTION = ("x", "y", "z"), ("vx", "vy", "vz")
 _UNITS = dict.fromkeys((*_PLACE, "radius"), "m") | dict.fromkeys(_MOTION, "m s-1") | {"block": "1"}
 
 
-def read_balls(path: Path) -> Particles:
+def read_balls(path: Path, law: ContactLaw | None = None) -> Particles:
     """Read balls from a CSV or ``.npz`` file.
 
     A CSV has the columns x, y, z, radius and optionally vx, vy, vz and block, with units in its
@@ -26,14 +27,21 @@ def read_balls(path: Path) -> Particles:
     same names, or x (n, 3) and r (n,), and optionally v (n, 3), w (n, 3) and block (n,), as runs
     write their final state. Balls without a block have block -1.
 
+    Parameters
+    ----------
+    path : Path
+    law : ContactLaw, optional
+        Balls at rest may overlap as far as their own weight presses them for this law.
+
     Raises
     ------
     SpecError
         One line per fault: no such file, unreadable, missing columns, shapes, what is no number
-        (with its line), radii, balls that overlap by more than a tenth of their radius.
+        (with its line), radii, balls that overlap by more than a tenth of their radius
+        (or more than the weight above them can cause).
     """
     if path.suffix.lower() == ".csv":
-        return _read_csv(path)
+        return _read_csv(path, law)
     arrays = _read_arrays(path)
     if "x" in arrays and arrays["x"].ndim == 1 and "y" in arrays:
         arrays = _stacked(path, arrays)
@@ -49,13 +57,14 @@ def read_balls(path: Path) -> Particles:
         velocity=arrays.get("v"),
         spin=arrays.get("w"),
         block=None if block is None else block.astype(np.int64),
+        law=law,
     )
     if faults:
         raise SpecError("\n".join(f"{path}: {fault}" for fault in faults))
     return balls
 
 
-def _read_csv(path: Path) -> Particles:
+def _read_csv(path: Path, law: ContactLaw | None) -> Particles:
     table = read_table(path, _UNITS, (*_PLACE, "radius"), bare=True)
     number = table.number
     given = [name for name in _MOTION if name in number]
@@ -71,6 +80,7 @@ def _read_csv(path: Path) -> Particles:
         number["radius"],
         velocity=_columns(number, _MOTION) if given else None,
         block=None if block is None else block.astype(np.int64),
+        law=law,
     )
     if faults:
         first = f"ball 0 is that of line {table.line[0]}"

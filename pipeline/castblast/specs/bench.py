@@ -22,6 +22,7 @@ from castblast.muckpile.packing import check_packing
 from castblast.resources import resource
 from castblast.specs.balls import BallsSpec
 from castblast.specs.firing import Direction, FiringPlan
+from castblast.specs.ground import GroundSpec, one_or_many
 from castblast.specs.loading import Spec, load_spec
 from castblast.specs.quantity import QuantityError, QuantityIn, convert, convert_variable
 from castblast.variables import VARIABLES
@@ -234,6 +235,8 @@ class BenchSpec(Spec):
     balls : BallsSpec, or the name of a file of balls
     contact : ContactSpec
     slope : SlopeSpec, optional
+    ground : GroundSpec, the name of a file, or a list of both
+        What lies before the bench: heights of a survey or of an earlier pile, or an STL surface.
     stop : StopRule
     numerics : Numerics
     ore : str, optional
@@ -251,6 +254,7 @@ class BenchSpec(Spec):
     balls: Annotated[BallsSpec, BeforeValidator(_file_or_group)]
     contact: ContactSpec = ContactSpec()
     slope: SlopeSpec | None = None
+    ground: Annotated[tuple[GroundSpec, ...], BeforeValidator(one_or_many)] = ()
     stop: StopRule = StopRule()
     numerics: Numerics = Numerics()
     ore: Annotated[str, Field(min_length=1)] | None = None
@@ -277,6 +281,12 @@ class BenchSpec(Spec):
         if faults:
             raise QuantityError("; ".join(faults))
         return self
+
+    def files(self) -> list[str]:
+        """Names of the files that belong to the bench, relative to its own."""
+        grounds = [ground.heightmap or ground.stl for ground in self.ground]
+        named = (self.balls.file, self.firing.holes, self.ore, *grounds)
+        return list(dict.fromkeys(str(name) for name in named if name is not None))
 
     def design(self) -> dict[str, Any] | None:
         """Design for the surrogate in SI units, with the geometry of the bench; None without."""

@@ -115,6 +115,13 @@ def find_network(fit: Path) -> Path:
 
 def _targets(targets: Sequence[str]) -> list[str]:
     wanted = list(dict.fromkeys(target.strip() for target in targets if target.strip()))
+    for engine in ("lammps", "liggghts"):
+        if {engine, f"{engine}-deck"} & set(wanted):
+            raise SpecError(
+                f"export target '{engine}': a bench is written for {engine.upper()} by "
+                f"castblast muckpile BENCH --{engine} DIR; a network is exported to "
+                f"{' or '.join(_WRITERS)}"
+            )
     faults = [
         f"export target '{target}': not known{nearest_name(target, _WRITERS)} "
         f"(there are {', '.join(_WRITERS)})"

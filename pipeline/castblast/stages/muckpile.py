@@ -11,27 +11,36 @@ import numpy as np
 from castblast.errors import SimulationError, SpecError, Status
 from castblast.muckpile.bench import Bench
 from castblast.muckpile.enclosure import rock_walls
-from castblast.muckpile.initial_state import wall_faults
+from castblast.muckpile.initial_state import pressed_share
 from castblast.muckpile.metrics import pile_metrics
 from castblast.muckpile.particles import Particles
 from castblast.muckpile.simulation import Simulation
 from castblast.muckpile.solver import CastCase, CastResult, run_cast
+from castblast.muckpile.terrain import wall_faults
 from castblast.muckpile.threads import thread_count
 from castblast.muckpile.walls import Walls, bench_walls, join, slope
 from castblast.progress import ProgressCallback, silent
 from castblast.specs.balls import ChosenSizes
 from castblast.specs.bench import BenchSpec, find_bench, load_bench
+from castblast.specs.ground import read_ground
 from castblast.specs.quantity import parse_quantity
+from castblast.stages.muckpile_deck import Decks, write_decks
 from castblast.stages.muckpile_extras import Extras, read_extras
 from castblast.stages.muckpile_frames import Frames
 from castblast.stages.muckpile_ore import follow_ore
 from castblast.stages.muckpile_plan import Plan, make_plan
-from castblast.stages.muckpile_results import MuckpileOutcome, describe_run, write_results
+from castblast.stages.muckpile_results import (
+    MuckpileOutcome,
+    bench_content,
+    describe_run,
+    write_results,
+)
 from castblast.stages.muckpile_start import make_start
 
 _PACKING_SHARE, _CAST_SHARE = 0.25, 0.95
 _MAX_VELOCITY = 100.0
 _FEWEST_BALLS = 10
+_RESTART = "restart.npz"
 #: Simulated time [s] that is enough for one step.
 _ONE_STEP = 1e-12
 
@@ -46,9 +55,10 @@ def run_muckpile(
     seed: int | None = None,
     packings: Path | None = None,
     extras: Extras = Extras(),  # noqa: B008 - a record of constants
+    decks: Decks = Decks(),  # noqa: B008 - a record of constants
     progress: ProgressCallback = silent,
 ) -> MuckpileOutcome:
-    """Run a bench file.
+    """Run a bench file; an interrupted run goes on where it was, to the same numbers.
 
     Parameters
     ----------
@@ -69,16 +79,19 @@ def run_muckpile(
         whatever run made it. Default: ``packings`` in `out`.
     extras : Extras
         Ore, animation, files for ParaView.
+    decks : Decks
+        Folders for the input of LAMMPS or LIGGGHTS. With one the bench is packed and checked but
+        not thrown.
     progress : callback
 
     Raises
     ------
     SpecError
-        Faults of the bench file, of a file of balls, holes or ore, or of an extra; a wall that
-        cuts the balls, a step above the stable one, too little memory. Nothing has been simulated
-        then, and a packing that was made is kept.
+        Faults of the bench file, of a file of balls, holes, ground or ore, or of an extra; a wall
+        that cuts the balls, a step above the stable one, too little memory, or what another engine
+        cannot take. Nothing has been simulated then, and a packing that was made is kept.
     SimulationError
-        The simulation became unstable.
+        The simulation became unstable; its last restart file is kept.
     """
     path = find_bench(bench)
     spec = _with_options(load_bench(path), balls, velocity)
@@ -86,6 +99,7 @@ def run_muckpile(
         spec = spec.model_copy(update={"seed": seed})
     geometry = spec.bench.to_bench()
     wanted = read_extras(extras, geometry, path.parent / spec.ore if spec.ore else None)
+    walls = _walls(spec, geometry, path.parent)
     plan = make_plan(spec, geometry, path.parent, one_speed=velocity is not None)
     folder = Path("runs") / spec.name if out is None else out
     threads = threads or 0
@@ -98,9 +112,11 @@ def run_muckpile(
         threads,
         _part(progress, 0.0, _PACKING_SHARE),
     )
-    folder.mkdir(parents=True, exist_ok=True)
-    case = _case(spec, geometry, start.balls, plan, threads)
+    case = _case(spec, walls, start.balls, plan, threads)
     _require_possible(spec, case)
+    if decks.wanted:
+        return write_decks(spec, case, decks)
+    folder.mkdir(parents=True, exist_ok=True)
     result, frames = _simulate(
         spec, case, folder, extras, wanted.interval, _part(progress, _PACKING_SHARE, _CAST_SHARE)
     )
@@ -114,7 +130,8 @@ def run_muckpile(
     )
     ore = follow_ore(wanted.ore, wanted.plan, case, result)
     outcome = describe_run(spec, plan.speed, plan.prediction, start, result, metrics, ore)
-    outcome = replace(outcome, document=outcome.document | {"fragments": _describe_sizes(sizes)})
+    more = {"fragments": _describe_sizes(sizes), **bench_content(spec, path.parent)}
+    outcome = replace(outcome, document=outcome.document | more)
     files = write_results(folder, spec, case, result, outcome.document, ore) + frames
     progress(1.0, f"{result.time:.1f} s simulated")
     return MuckpileOutcome(outcome.document, outcome.title, outcome.rows, files)
@@ -140,7 +157,9 @@ def _simulate(
             vtk=extras.vtk,
             vtkhdf=extras.vtkhdf,
         )
-    result = run_cast(case, progress, frames)
+    # Frames along the way are not kept in a restart file: such a run begins anew.
+    restart = None if frames else folder / _RESTART
+    result = run_cast(case, progress, frames, restart)
     if frames is not None:
         progress(1.0, "writing frames")
         files = frames.close()
@@ -149,6 +168,8 @@ def _simulate(
             f"{spec.name}: the simulation became unstable at {result.failed_time:.3g} s "
             f"(ball {result.failed_ball})"
         )
+        if restart is not None and restart.exists():
+            message += f"; its last good state is kept in {restart}"
         raise SimulationError(message)
     return result, files
 
@@ -208,27 +229,25 @@ def _describe_sizes(chosen: ChosenSizes | None) -> dict[str, Any] | None:
     }
 
 
-def _walls(spec: BenchSpec, bench: Bench) -> Walls:
-    ahead = spec.slope
-    if not bench.corners:
-        return bench_walls(
-            bench,
-            rear=spec.bench.rear,
-            ends=spec.bench.ends,
-            slope_distance=ahead.distance if ahead else None,
-            **({"slope_angle": ahead.angle} if ahead else {}),
-        )
-    walls = rock_walls(bench)
-    return walls if ahead is None else join(walls, slope(ahead.distance, ahead.angle))
+def _walls(spec: BenchSpec, bench: Bench, beside: Path) -> Walls:
+    if bench.corners:
+        parts = [rock_walls(bench)]
+    else:
+        parts = [bench_walls(bench, rear=spec.bench.rear, ends=spec.bench.ends)]
+    if spec.slope is not None:
+        parts.append(slope(spec.slope.distance, spec.slope.angle))
+    if spec.ground:
+        parts.append(read_ground(spec.ground, beside))
+    return join(*parts)
 
 
-def _case(spec: BenchSpec, bench: Bench, balls: Particles, plan: Plan, threads: int) -> CastCase:
+def _case(spec: BenchSpec, walls: Walls, balls: Particles, plan: Plan, threads: int) -> CastCase:
     if spec.firing.pattern == "none":
         balls = balls._replace(block=np.full_like(balls.block, -1))
     return CastCase(
         particles=balls,
         law=spec.contact.to_law(),
-        walls=_walls(spec, bench),
+        walls=walls,
         block_delay=plan.delay,
         block_velocity=plan.velocity,
         hold_unfired=spec.firing.hold_unfired,
@@ -243,7 +262,9 @@ def _case(spec: BenchSpec, bench: Bench, balls: Particles, plan: Plan, threads: 
 
 def _require_possible(spec: BenchSpec, case: CastCase) -> None:
     """Refuse walls that cut the balls, and a fixed step above the stable one."""
-    faults = [f"{spec.name}: {fault}" for fault in wall_faults(case.particles, case.walls)]
+    allowed = pressed_share(case.particles, case.law, case.gravity)
+    cuts = wall_faults(case.walls, case.particles, allowed)
+    faults = [f"{spec.name}: {cut}" for cut in cuts]
     if not faults and case.time_step > 0.0:
         stable = _stable_step(case)
         if case.time_step > stable:

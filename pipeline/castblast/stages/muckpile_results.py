@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 from collections.abc import Mapping
@@ -28,6 +29,7 @@ from castblast.stages.muckpile_tables import (
     pile_surface,
     profile_columns,
 )
+from castblast.stages.reuse import file_hash
 
 #: Unit of every number in the document; "1": none.
 DOCUMENT_UNITS = {
@@ -88,7 +90,6 @@ def describe_run(
     seconds = counters.pop("seconds")
     document = {
         "bench": spec.name,
-        "bench_sha256": spec.sha256(),
         "seed": spec.seed,
         "geometry": spec.bench.to_bench()._asdict(),
         "status": Status(result.status).name.lower(),
@@ -112,6 +113,15 @@ def describe_run(
     if Status(result.status) is Status.NOT_CONVERGED:
         title += " (longest time reached before the pile came to rest)"
     return MuckpileOutcome(plain, title, metric_rows(plain))
+
+
+def bench_content(spec: BenchSpec, beside: Path) -> dict[str, Any]:
+    """Hash of all that a bench file says, the content of the files that it names included."""
+    named = {name: file_hash(beside / name) for name in spec.files()}
+    digest = hashlib.sha256(spec.sha256().encode())
+    for name, content in named.items():
+        digest.update(f" {name} {content}".encode())
+    return {"bench_sha256": digest.hexdigest(), "bench_files": named}
 
 
 def metric_rows(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:

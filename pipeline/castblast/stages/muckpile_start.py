@@ -58,7 +58,7 @@ def make_start(
     """
     if spec.balls.file is not None:
         path = beside / spec.balls.file
-        balls = read_balls(path)
+        balls = read_balls(path, spec.contact.to_law())
         require_memory(len(balls.radius), spec.name)
         if (balls.block < 0).all():
             balls = balls._replace(block=plan.blocks_of(balls.position, bench))
