@@ -49,8 +49,9 @@ class Points(NamedTuple):
     explosive: NDArray[np.int64]
     shares: Floats
 
-    def __len__(self) -> int:
-        """Give the number of points, not of fields."""
+    @property
+    def count(self) -> int:
+        """Number of points."""
         return len(self.explosive)
 
     def take(self, rows: NDArray[np.integer] | NDArray[np.bool_]) -> Points:

@@ -31,6 +31,7 @@ from castblast.network import Floats
 from castblast.progress import ProgressCallback, silent
 from castblast.surrogate.domain import Domain, Points
 from castblast.surrogate.gate import Surrogate, fit_surrogate
+from castblast.surrogate.probe import VELOCITY
 from castblast.surrogate.training import Fit
 
 #: Places of the unit box (n, d) to answers (n, m).
@@ -88,7 +89,7 @@ def sobol_report(
     fit: Fit | Surrogate,
     domain: Domain,
     *,
-    rows: int = 8192,
+    rows: int = 16384,
     checked: Sequence[str] = (),
     checked_rows: int = 1024,
     seed: int = 0,
@@ -104,7 +105,7 @@ def sobol_report(
         Base sample; 2 evaluations of the surrogate a row, and 2 more per input.
     checked : sequence of str
         Inputs whose indices the simulator gives as well; default: the three that matter most to
-        the first target.
+        the burden velocity.
     checked_rows : int
         Base sample of the check: 2 runs of the simulator (1.3 ms) a row and 2 more per input; 0:
         no check.
@@ -114,13 +115,15 @@ def sobol_report(
     Returns
     -------
     dict
-        Plain JSON values: ``method``, ``inputs``, ``targets``; ``indices``, target -> input ->
+        Plain JSON values: ``method``, ``rows``, ``targets``; ``inputs``, name -> what is varied
+        (a ratio for some); ``indices``, target -> input ->
         first, first_interval, total, total_interval; ``physics``, ``rows`` and target -> input ->
         ``simulator`` and ``surrogate``, indices on the same rows, so that their difference is
         that of the models, not of the sample.
     """
     surrogate = fit if isinstance(fit, Surrogate) else fit_surrogate(fit)
     names, kinds = (*domain.sampled, EXPLOSIVE), len(domain.explosives)
+    headline = VELOCITY if VELOCITY in surrogate.targets else surrogate.targets[0]
 
     def points(shares: Floats) -> Points:
         kind = np.minimum(shares[:, -1] * kinds, kinds - 1).astype(np.int64)
@@ -139,7 +142,7 @@ def sobol_report(
     samples = draw_samples(names, possible, rows, seed, progress=progress)
     indices = _by_target(sobol_indices(samples, ask), surrogate.targets)
     if not checked:
-        ranked = indices[surrogate.targets[0]]
+        ranked = indices[headline]
         checked = sorted(ranked, key=lambda name: -ranked[name].total)[:3]
     physics: dict[str, Any] = {}
     if checked_rows:
@@ -161,7 +164,7 @@ def sobol_report(
     return {
         "method": "SALib, Sobol indices over the possible designs of the recipe",
         "rows": rows,
-        "inputs": list(names),
+        "inputs": {name: _meaning(domain, name) for name in names},
         "targets": list(surrogate.targets),
         "indices": {
             target: {name: index.to_document() for name, index in entries.items()}
@@ -169,6 +172,13 @@ def sobol_report(
         },
         "physics": {"rows": checked_rows, "targets": physics},
     }
+
+
+def _meaning(domain: Domain, name: str) -> str:
+    """What the recipe varies under a name: the input, or its ratio to another one."""
+    spec = domain.recipe.variables.get(name)
+    base = None if spec is None else spec.ratio_of
+    return (name if base is None else f"{name} over {base}").replace("_", " ")
 
 
 def draw_samples(
