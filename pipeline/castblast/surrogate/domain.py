@@ -50,7 +50,7 @@ class Points(NamedTuple):
     shares: Floats
 
     @property
-    def count(self) -> int:
+    def size(self) -> int:
         """Number of points."""
         return len(self.explosive)
 

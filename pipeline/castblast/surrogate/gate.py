@@ -57,8 +57,8 @@ class Surrogate(NamedTuple):
     def answers(self, domain: Domain, points: Points) -> dict[str, Floats]:
         """Predictions by target at points of a domain, in blocks."""
         parts = []
-        for begin in range(0, points.count, _CHUNK):
-            rows = np.arange(begin, min(begin + _CHUNK, points.count))
+        for begin in range(0, points.size, _CHUNK):
+            rows = np.arange(begin, min(begin + _CHUNK, points.size))
             parts.append(self.predict(domain.frame(points.take(rows), self.features)))
         values = np.concatenate(parts)
         return {name: values[:, j] for j, name in enumerate(self.targets)}

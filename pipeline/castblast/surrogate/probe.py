@@ -115,7 +115,7 @@ class Pairs:
             "input": self.direction.name,
             "sign": self.direction.sign,
             "held": self.direction.held,
-            "pairs": self.at.count,
+            "pairs": self.at.size,
             "sign_required": int(required.sum()),
             "simulator_breaks_sign": int(wrong.sum()),
             "simulator_slope": {"least": low, "median": middle, "most": high},
@@ -154,8 +154,8 @@ class Probe:
         """Give what the simulator does, per direction, as plain JSON values."""
         return {
             "target": VELOCITY,
-            "points": self.points.count,
-            "dense_points": self.dense.count,
+            "points": self.points.size,
+            "dense_points": self.dense.size,
             "step": STEP,
             "directions": [pairs.to_document() for pairs in self.pairs],
         }
@@ -254,7 +254,7 @@ def _changes(
 
 def _required_sign(direction: Direction, points: Points) -> Floats:
     if direction.name != "bench_height":
-        return np.full(points.count, float(direction.sign))
+        return np.full(points.size, float(direction.sign))
     inputs = points.inputs
     toe = 0.5 * inputs["bench_height"] / np.tan(inputs["face_angle"])
     rise = inputs["stemming_length"] / inputs["charge_length"] - toe / (inputs["burden"] + toe)
