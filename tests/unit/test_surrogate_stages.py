@@ -1,18 +1,20 @@
-"""Train, export and predict as stages: files in, the same files out every time."""
+"""Compare, train, export and predict as stages: files in, the same files out every time."""
 
 import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from castblast.errors import DatasetError, SpecError
+from castblast.stages.compare import DEMO, compare
 from castblast.stages.export import export
 from castblast.stages.predict import predict, predict_design
 from castblast.stages.predict_table import predict_csv
-from castblast.stages.train import train
+from castblast.stages.train import TrainOutcome, train
 from castblast.variables import STEMMING_RATIO
 
 MODELS = {
@@ -33,15 +35,26 @@ def source(toy_dataset, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path,
 
 @pytest.fixture(scope="module")
 def fits(source, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("fits")
-    train(*source, out)
-    return out
+    out = tmp_path_factory.mktemp("models")
+    _compare(source, out)
+    return out / "fits"
 
 
 @pytest.fixture(scope="module")
-def network(fits: Path) -> Path:
-    export(fits, fits.parent / "chosen", parity=fits.parent / "parity.json")
-    return fits.parent / "chosen" / "network.json"
+def comparison(fits: Path) -> Path:
+    return fits.parent / "comparison"
+
+
+@pytest.fixture(scope="module")
+def network(comparison: Path) -> Path:
+    export(comparison, comparison.parent / "chosen", parity=comparison.parent / "parity.json")
+    return comparison.parent / "chosen" / "network.json"
+
+
+def _compare(source, out: Path, **options: Any) -> TrainOutcome:
+    return compare(
+        *source, out / "comparison", fits=out / "fits", extent=DEMO, workers=1, **options
+    )
 
 
 def _bytes(folder: Path) -> dict[str, bytes]:
@@ -52,18 +65,36 @@ def _bytes(folder: Path) -> dict[str, bytes]:
     }
 
 
-def test_training_leaves_scores_tables_and_pictures(fits: Path) -> None:
-    files = ("fit.json", "network.json", "parity.png", "test_rows.csv")
-    curve = ("figure_2.png", "learning_curve.csv")
-    expected = {f"{name}/{file}" for name in MODELS for file in (*files, *curve)}
-    assert set(_bytes(fits)) == {"comparison.json", *expected}
-    league = json.loads((fits / "comparison.json").read_text())
+def _same(folder: Path) -> dict[str, bytes]:
+    """Files that are a function of dataset and specs: no times, no store of estimators."""
+    return {
+        name: content
+        for name, content in _bytes(folder).items()
+        if not name.endswith((".pickle", "timings.json", "report.html", "dataset.txt"))
+    }
+
+
+def test_fits_leave_scores_tables_and_pictures(fits: Path) -> None:
+    files = ("fit.json", "fit.pickle", "network.json", "parity.png", "test_rows.csv")
+    expected = {f"{name}/{file}" for name in MODELS for file in files}
+    assert expected <= set(_bytes(fits))
+
+
+def test_a_comparison_leaves_league_curves_and_page(comparison: Path) -> None:
+    league = json.loads((comparison / "comparison.json").read_text())
     assert league["paper"]["relative_error_95"] == 0.025
     assert {entry["name"] for entry in league["league"]} == set(MODELS)
-    assert (fits / "first" / "figure_2.png").read_bytes().startswith(b"\x89PNG")
+    assert league["remarks"], "a dataset without a recipe has no physics gate: that must be said"
+    chosen = league["chosen"]
+    assert (comparison / chosen / "figure_2.png").read_bytes().startswith(b"\x89PNG")
+    assert len(league["worst_cases"]) == 10
+    page = (comparison / "report.html").read_text(encoding="utf-8")
+    for name in MODELS:
+        assert name in page
+    assert "fit_seconds" in (comparison / "timings.json").read_text()
 
 
-def test_tracking_changes_no_byte(source, fits: Path, tmp_path: Path) -> None:
+def test_tracking_changes_no_byte(source, comparison: Path, tmp_path: Path) -> None:
     """The lab book observes: every file of the run without it is the same with it.
 
     The book holds one run per fit under a parent, dataset and signature with each model, and the
@@ -71,8 +102,9 @@ def test_tracking_changes_no_byte(source, fits: Path, tmp_path: Path) -> None:
     """
     mlflow = pytest.importorskip("mlflow")
     before = mlflow.get_tracking_uri()
-    train(*source, tmp_path / "fits", tracking=True, runs=tmp_path / "runs")
-    assert _bytes(tmp_path / "fits") == _bytes(fits)
+    _compare(source, tmp_path, tracking=True, runs=tmp_path / "runs")
+    for folder in ("comparison", "fits"):
+        assert _same(tmp_path / folder) == _same(comparison.parent / folder)
     assert mlflow.get_tracking_uri() == before
     uri = f"sqlite:///{tmp_path / 'runs' / 'mlflow.db'}"
     client = mlflow.MlflowClient(uri, registry_uri=uri)
@@ -84,7 +116,7 @@ def test_tracking_changes_no_byte(source, fits: Path, tmp_path: Path) -> None:
         assert "test_p95_rel_err_burden_velocity" in run.data.metrics
         assert run.inputs.dataset_inputs[0].dataset.name == "toy"
     champion = client.get_model_version_by_alias("castblast_toy", "champion")
-    chosen = json.loads((fits / "comparison.json").read_text())["chosen"]
+    chosen = json.loads((comparison / "comparison.json").read_text())["chosen"]
     assert f"/{chosen}/" in client.get_run(champion.run_id).info.run_name
     (model,) = (tmp_path / "runs" / "artifacts").glob(f"models/{champion.source.split('/')[-1]}")
     signature = (model / "artifacts" / "MLmodel").read_text()
@@ -92,8 +124,8 @@ def test_tracking_changes_no_byte(source, fits: Path, tmp_path: Path) -> None:
     assert "burden_velocity" in signature
 
 
-def test_export_finds_the_chosen_fit(fits: Path, network: Path) -> None:
-    chosen = json.loads((fits / "comparison.json").read_text())["chosen"]
+def test_export_finds_the_chosen_fit(fits: Path, comparison: Path, network: Path) -> None:
+    chosen = json.loads((comparison / "comparison.json").read_text())["chosen"]
     assert network.read_bytes() == (fits / chosen / "network.json").read_bytes()
     parity = json.loads((fits.parent / "parity.json").read_text())
     assert parity["json"]["passed"]
@@ -230,6 +262,6 @@ def test_the_rows_that_meet_the_paper_are_named(
 ) -> None:
     """A power law is met by the power-law model from the first point on; a bent one never."""
     toy_dataset(600, bend=bend).to_netcdf(tmp_path / "bent.nc")
-    outcome = train(tmp_path / "bent.nc", [source[1][1]], tmp_path / "out")
+    outcome = _compare((tmp_path / "bent.nc", [source[1][1]]), tmp_path)
     assert any(f"second: the published figures are {line}" in entry for entry in outcome.lines)
-    assert outcome.rows[-1][0] == "paper"
+    assert outcome.rows[-1][0].startswith("paper")

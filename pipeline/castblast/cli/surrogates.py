@@ -1,8 +1,8 @@
-"""`castblast train` and `castblast export`: from a dataset to a model other tools can use."""
+"""From a dataset to a model other tools can use: `train`, `tune`, `compare`, `runs`, `export`."""
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -10,31 +10,168 @@ from castblast.cli.options import OutFolder
 from castblast.cli.screen import Screen
 from castblast.cli.verb import verb
 
+if TYPE_CHECKING:
+    from castblast.stages.train import TrainOutcome
+
+_Dataset = Annotated[Path, typer.Argument(help="Dataset (netCDF).")]
+_Tracking = Annotated[bool, typer.Option(help="Keep a record of the runs in MLflow.")]
+_Runs = Annotated[Path, typer.Option(help="Folder of the MLflow record.")]
+_Workers = Annotated[
+    int | None,
+    typer.Option(
+        "--workers",
+        min=1,
+        help="Fits at a time, each a process; default: all cores.",
+        show_default=False,
+    ),
+]
+_RUNS = Path("runs")
+
 
 def train(
     screen: Screen,
-    dataset: Annotated[Path, typer.Argument(help="Dataset (netCDF).")],
+    dataset: _Dataset,
     specs: Annotated[
         list[Path] | None,
         typer.Argument(help="Model specs (YAML); default: the reference.", show_default=False),
     ] = None,
     out: OutFolder = None,
-    tracking: Annotated[bool, typer.Option(help="Keep a record of the runs in MLflow.")] = True,
+    workers: _Workers = None,
+    tracking: _Tracking = True,
+    runs: _Runs = _RUNS,
 ) -> Mapping[str, Any]:
-    """Fit models, score them on rows never trained on and draw the paper's Figure 2."""
+    """Fit models and score them on rows never trained on; fits that are there stay."""
     from castblast.stages.train import train as run
 
     with screen.progress("train") as progress:
-        outcome = run(dataset, specs or [], out, tracking=tracking, progress=progress)
-    screen.table(outcome.header, outcome.rows, title=outcome.title)
-    for line in outcome.lines:
-        screen.say(line)
-    return outcome.document
+        outcome = run(
+            dataset,
+            specs or [],
+            out,
+            workers=workers,
+            tracking=tracking,
+            runs=runs,
+            progress=progress,
+        )
+    return _show(screen, outcome)
+
+
+def tune(
+    screen: Screen,
+    dataset: _Dataset,
+    spec: Annotated[Path, typer.Argument(help="Model spec (YAML) with a block 'search'.")],
+    trials: Annotated[
+        int | None,
+        typer.Option(help="Trials in total, earlier ones included.", show_default=False),
+    ] = None,
+    timeout: Annotated[
+        float | None,
+        typer.Option(help="Start no trial later than this [s].", show_default=False),
+    ] = None,
+    study: Annotated[
+        Path | None,
+        typer.Option(help="File of the study; default: in the folder.", show_default=False),
+    ] = None,
+    out: OutFolder = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the sampler.")] = 0,
+    tracking: _Tracking = True,
+    runs: _Runs = _RUNS,
+) -> Mapping[str, Any]:
+    """Search the settings that a spec declares; a study that was stopped goes on."""
+    from castblast.stages.tune import tune as run
+
+    with screen.progress("tune") as progress:
+        outcome = run(
+            dataset,
+            spec,
+            trials=trials,
+            timeout=timeout,
+            study=study,
+            out=out,
+            seed=seed,
+            tracking=tracking,
+            runs=runs,
+            progress=progress,
+        )
+    return _show(screen, outcome)
+
+
+def compare(
+    screen: Screen,
+    dataset: Annotated[
+        Path, typer.Argument(help="Dataset (netCDF), or a folder of fits made from one.")
+    ],
+    specs: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            help="Model specs (YAML) or folders of them; default: all shipped ones.",
+            show_default=False,
+        ),
+    ] = None,
+    out: OutFolder = None,
+    fits: Annotated[
+        Path | None,
+        typer.Option(help="Folder of the fits; default: beside the dataset.", show_default=False),
+    ] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A first look: fewer rows and iterations.")
+    ] = False,
+    workers: _Workers = None,
+    tracking: _Tracking = True,
+    runs: _Runs = _RUNS,
+) -> Mapping[str, Any]:
+    """Rank models on rows never trained on, ask them for physics, choose one (exit code 4: none).
+
+    What is fitted already is not fitted again, so a comparison that was stopped goes on.
+    """
+    from castblast.stages.compare import FULL, QUICK
+    from castblast.stages.compare import compare as run
+
+    with screen.progress("compare") as progress:
+        outcome = run(
+            dataset,
+            specs or [],
+            out,
+            fits=fits,
+            extent=QUICK if quick else FULL,
+            workers=workers,
+            tracking=tracking,
+            runs=runs,
+            progress=progress,
+        )
+    if outcome.document["chosen"] is None:
+        screen.exit_code = 4
+    return _show(screen, outcome)
+
+
+def runs(
+    screen: Screen,
+    folder: Annotated[Path, typer.Argument(help="Folder of the MLflow record.")] = _RUNS,
+    experiment: Annotated[
+        str | None, typer.Option(help="Only this one, e.g. paper/1.", show_default=False)
+    ] = None,
+    stage: Annotated[
+        str | None,
+        typer.Option(help="Only compare, tune, train, fit or trial.", show_default=False),
+    ] = None,
+    sort: Annotated[
+        str | None,
+        typer.Option(help="Sort by a metric, e.g. valid_error, best first.", show_default=False),
+    ] = None,
+    limit: Annotated[int, typer.Option(min=0, help="At most so many; 0: all.")] = 30,
+) -> Mapping[str, Any]:
+    """List the recorded runs, newest first."""
+    from castblast.stages.runs import list_runs
+
+    outcome = list_runs(folder, experiment=experiment, stage=stage, sort=sort, limit=limit)
+    return _show(screen, outcome)
 
 
 def export(
     screen: Screen,
-    fit: Annotated[Path, typer.Argument(help="Folder of a fit, or a network.json.")],
+    fit: Annotated[
+        Path, typer.Argument(help="Folder of a comparison or a fit, or a network.json.")
+    ],
     out: OutFolder = None,
     to: Annotated[str, typer.Option(help="Targets, separated by commas.")] = "json,onnx",
     verify: Annotated[bool, typer.Option(help="Run every export and compare it.")] = True,
@@ -48,7 +185,14 @@ def export(
     return outcome.document
 
 
+def _show(screen: Screen, outcome: "TrainOutcome") -> Mapping[str, Any]:
+    screen.table(outcome.header, outcome.rows, title=outcome.title)
+    for line in outcome.lines:
+        screen.say(line)
+    return outcome.document
+
+
 def add_to(app: typer.Typer) -> None:
     """Register the verbs."""
-    verb(app)(train)
-    verb(app)(export)
+    for function in (train, tune, compare, runs, export):
+        verb(app)(function)

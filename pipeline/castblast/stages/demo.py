@@ -89,24 +89,32 @@ def _make_dataset(demo: Demo, progress: ProgressCallback) -> list[str]:
 
 
 def _train(demo: Demo, progress: ProgressCallback) -> list[str]:
-    from castblast.stages.train import train
+    from castblast.stages.compare import DEMO, compare
 
     folder = demo.out / "models"
     specs = [resource(f"models/specs/{name}.yaml") for name in MODELS]
     key = make_key(dataset=demo.dataset, **{spec.stem: spec for spec in specs})
     if not demo.restart and is_valid(folder, key):
         return [f"{folder}: still valid, reused"]
-    outcome = train(
-        demo.dataset, specs, folder, tracking=True, runs=demo.out / "runs", progress=progress
+    outcome = compare(
+        demo.dataset,
+        specs,
+        folder,
+        fits=demo.out / "fits",
+        extent=DEMO,
+        workers=demo.workers,
+        tracking=True,
+        runs=demo.out / "runs",
+        progress=progress,
     )
     mark_valid(folder, key)
     return [_league_line(row) for row in outcome.rows] + outcome.lines
 
 
 def _league_line(row: list[str]) -> str:
-    """Model, training rows, R² and 95 % error of the burden velocity."""
-    name, rows, _, velocity, *_ = row
-    return f"{name:22s} {rows:>6s} rows   burden velocity R², 95 % error: {velocity}"
+    """Model, physics gate, R² and 95 % error of the burden velocity."""
+    name, gate, _, velocity, *_ = row
+    return f"{name:22s} {gate:8s} burden velocity R², 95 % error: {velocity}"
 
 
 def _export(demo: Demo, progress: ProgressCallback) -> list[str]:

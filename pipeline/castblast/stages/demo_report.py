@@ -92,11 +92,12 @@ def _surrogate(folder: Path) -> Section:
         if (path := folder / name / "figure_2.png").is_file()
     ]
     best = comparison["league"][0]["name"]
+    parity = folder.parent / "fits" / best / "parity.png"
     return Section(
         "Surrogate: league table and the paper's Figure 2",
         paragraphs=[f"Chosen: {comparison['chosen']} ({comparison['rule']})."],
         tables=[Table(header, rows, caption)],
-        pictures=[*figures, Picture(folder / best / "parity.png", f"All targets of {best}")],
+        pictures=[*figures, Picture(parity, f"All targets of {best}")],
     )
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import pickle
+from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
@@ -25,12 +26,10 @@ from castblast.surrogate.training import Fit
 #: Modules of this folder that look at fits but have no part in making one.
 _OBSERVERS = (
     "comparison", "gate", "shifts", "strata", "learning", "sensitivity", "tuning", "tuning_space",
-    "study_file", "tracking", "lab_book", "infill",
+    "study_file", "tracking", "logged_model", "run_list", "infill", "probe", "domain", "fit_store",
 )  # fmt: skip
 _LIBRARIES = ("numpy", "scikit-learn", "torch")
 _PACKAGE = Path(__file__).resolve().parent.parent
-
-FitKey = dict[str, str]
 
 
 def table_hash(table: Table) -> str:
@@ -46,7 +45,7 @@ def table_hash(table: Table) -> str:
     return digest.hexdigest()
 
 
-def fit_key(spec: ModelSpec, table: Table) -> FitKey:
+def fit_key(spec: ModelSpec, table: Table) -> dict[str, str]:
     """Everything that a fit is made from: spec, rows, code and libraries."""
     own = table.select(spec.features, spec.targets)
     return {
@@ -96,23 +95,45 @@ def _version(library: str) -> str:
         return ""
 
 
-def save_fit(path: Path, fit: Fit, key: FitKey) -> bool:
-    """Keep a fit; False where its estimator cannot be pickled, which a user's own may not."""
+def save_kept(path: Path, value: Any, key: Mapping[str, str]) -> bool:
+    """Keep a result with what it was made from; False where it cannot be pickled.
+
+    That may happen to a fit whose estimator is a user's own.
+    """
     try:
-        content = pickle.dumps({"key": key, "fit": fit}, protocol=5)
+        content = pickle.dumps({"key": dict(key), "value": value}, protocol=5)
     except (pickle.PicklingError, AttributeError, TypeError):
         return False
     write_with(path, lambda name: name.write_bytes(content))
     return True
 
 
-def load_fit(path: Path, key: FitKey) -> Fit | None:
-    """Give the fit that was made from exactly `key`; None if there is none or it is unreadable."""
+def load_kept(path: Path, key: Mapping[str, str]) -> Any:
+    """Give what was made from exactly `key`; None if there is none or it is unreadable."""
+    stored = _read(path)
+    return stored["value"] if stored and stored["key"] == dict(key) else None
+
+
+def save_fit(path: Path, spec: ModelSpec, fit: Fit, key: Mapping[str, str]) -> bool:
+    """Keep a fit with the spec as it was given, which may leave the features to the dataset."""
+    return save_kept(path, (spec, fit), key)
+
+
+def load_fit(path: Path, key: Mapping[str, str]) -> Fit | None:
+    """Give the fit that was made from exactly `key`, if it is there."""
+    kept = load_kept(path, key)
+    return kept[1] if kept else None
+
+
+def kept_spec(path: Path) -> ModelSpec | None:
+    """Spec of the fit that is kept in a file, whatever it was fitted on; None if unreadable."""
+    stored = _read(path)
+    return stored["value"][0] if stored else None
+
+
+def _read(path: Path) -> dict[str, Any] | None:
     try:
         stored: Any = pickle.loads(path.read_bytes())
-    except Exception:  # whatever a damaged or older file raises: the fit is made again
+    except Exception:  # whatever a damaged or older file raises: the result is made again
         return None
-    if not isinstance(stored, dict) or stored.get("key") != key:
-        return None
-    fit = stored.get("fit")
-    return fit if isinstance(fit, Fit) else None
+    return stored if isinstance(stored, dict) and {"key", "value"} <= stored.keys() else None

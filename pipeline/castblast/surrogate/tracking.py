@@ -1,77 +1,116 @@
-"""A lab book of training runs in MLflow: the only module that imports it.
+"""A lab book of fits, comparisons and studies in MLflow: the only module that imports it.
 
-An observer: it receives finished fits and their comparison and returns nothing that anyone reads,
-so results are the same with tracking off. Runs live in a SQLite file with the artifacts beside it
-(plain file stores are no longer opened by MLflow). MLflow keeps absolute paths: move the exports,
-not this folder.
+An observer: it receives finished work and returns nothing that anyone reads, so results are the
+same with tracking off. Runs live in a SQLite file with the artifacts beside it (plain file stores
+are no longer opened by MLflow). MLflow keeps absolute paths: move the exports, not this folder.
 """
 
 from __future__ import annotations
 
+import math
 import os
+import subprocess
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from castblast import __version__
 from castblast.surrogate.features import SPLITS
-from castblast.surrogate.training import Fit
+from castblast.surrogate.logged_model import log_model
+from castblast.surrogate.training import Fit, LearningPoint
 
-#: Types of our stock pipelines that skops does not trust by itself.
-_TRUSTED_TYPES = ["numpy.log", "numpy.exp"]
+if TYPE_CHECKING:
+    from castblast.surrogate.tuning import StudyResult
 
-
-class Tracker(Protocol):
-    """What training tells about finished work."""
-
-    def record(
-        self, fits: Sequence[Fit], comparison: Mapping[str, Any], files: Sequence[Path]
-    ) -> None:
-        """Keep fits of one dataset, their comparison and its files."""
-
-
-class NullTracker:
-    """Keeps nothing."""
-
-    def record(
-        self, fits: Sequence[Fit], comparison: Mapping[str, Any], files: Sequence[Path]
-    ) -> None:
-        """Do nothing."""
+Files = Mapping[str, Sequence[Path]]
 
 
 class MlflowTracker:
     """Writes runs to ``<folder>/mlflow.db`` and ``<folder>/artifacts``.
 
-    One parent run per comparison with one child run per fit; the chosen model is registered under
-    the name of the dataset with the alias ``champion``. No automatic logging.
+    One parent run per call with one child run per fit or trial, in the experiment
+    ``<dataset>/<major version>``. No automatic logging.
     """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder.resolve()
 
-    def record(
-        self, fits: Sequence[Fit], comparison: Mapping[str, Any], files: Sequence[Path]
+    def record_fits(self, fits: Sequence[Fit], files: Files) -> None:
+        """Keep fits that were made without a comparison.
+
+        Parameters
+        ----------
+        fits : sequence of Fit
+            Of one dataset.
+        files : mapping of spec name to sequence of path
+            Files of each fit.
+        """
+        with self._parent(fits[0].table.source, "train") as mlflow:
+            for fit in fits:
+                _record_fit(mlflow, fit, files.get(fit.spec.name, ()))
+
+    def record_comparison(
+        self,
+        fits: Sequence[Fit],
+        comparison: Mapping[str, Any],
+        files: Files,
+        curves: Mapping[str, Sequence[LearningPoint]],
     ) -> None:
-        """Write the runs; see the class."""
+        """Keep a comparison: its files, one child run per fit, and the chosen model registered.
+
+        The chosen model is a new version of ``castblast_<dataset>`` with the alias ``champion``.
+
+        Parameters
+        ----------
+        fits : sequence of Fit
+        comparison : mapping
+            With ``chosen``.
+        files : mapping of spec name to sequence of path
+            Files of each fit; those of the comparison under the empty name.
+        curves : mapping of spec name to learning curve
+        """
+        source = dict(fits[0].table.source)
+        with self._parent(source, "compare") as mlflow:
+            mlflow.log_dict(dict(comparison), "comparison.json")
+            mlflow.set_tag("chosen", comparison["chosen"])
+            _log_files(mlflow, files.get("", ()))
+            for fit in fits:
+                name, register = fit.spec.name, None
+                if name == comparison["chosen"]:
+                    register = f"castblast_{source.get('name', 'dataset')}"
+                _record_fit(mlflow, fit, files.get(name, ()), curves.get(name, ()), register)
+
+    def record_study(
+        self, study: StudyResult, source: Mapping[str, str], files: Sequence[Path]
+    ) -> None:
+        """Keep a study: its files and one child run without a model per trial."""
+        with self._parent(source, "tune") as mlflow:
+            mlflow.set_tags({"spec.sha256": study.spec.sha256(), "spec": study.identity["spec"]})
+            mlflow.log_metrics(_finite({"best_valid_error": study.best.error}))
+            _log_files(mlflow, files)
+            for trial in study.trials:
+                name = f"{study.identity['spec']}/trial {trial.number}"
+                tags = {**_tags(source, "trial"), "trial.state": trial.state}
+                with mlflow.start_run(run_name=name, nested=True, tags=tags):
+                    mlflow.log_params({key: str(v) for key, v in trial.settings.items()})
+                    mlflow.log_metrics(
+                        _finite({"valid_error": trial.error, "parameters": trial.parameters})
+                    )
+
+    @contextmanager
+    def _parent(self, source: Mapping[str, str], stage: str) -> Iterator[Any]:
+        """Open the store and a parent run in the experiment of a dataset."""
         self.folder.mkdir(parents=True, exist_ok=True)
         with _quiet_mlflow(f"sqlite:///{self.folder / 'mlflow.db'}") as mlflow:
-            source = dict(comparison["dataset"])
-            name = source.get("name", "dataset")
             major = source.get("dataset_version", "0").split(".")[0]
-            experiment = f"{name}/{major}"
+            experiment = f"{source.get('name', 'dataset')}/{major}"
             if mlflow.get_experiment_by_name(experiment) is None:
                 artifacts = (self.folder / "artifacts").as_uri()
                 mlflow.create_experiment(experiment, artifact_location=artifacts)
             mlflow.set_experiment(experiment)
-            with mlflow.start_run(run_name="compare", tags=_tags(source, "compare")):
-                mlflow.log_dict(dict(comparison), "comparison.json")
-                mlflow.set_tag("chosen", comparison["chosen"])
-                for path in files:
-                    mlflow.log_artifact(str(path))
-                for fit in fits:
-                    is_chosen = fit.spec.name == comparison["chosen"]
-                    _record_fit(mlflow, fit, source, f"castblast_{name}" if is_chosen else None)
+            with mlflow.start_run(run_name=stage, tags=_tags(source, stage)):
+                yield mlflow
 
 
 @contextmanager
@@ -103,66 +142,92 @@ def _tags(source: Mapping[str, str], stage: str) -> dict[str, str]:
         "castblast.version": __version__,
         "dataset.version": source.get("dataset_version", ""),
         "dataset.sha256": source.get("content_sha256", ""),
+        "git.commit": _git_commit(),
     }
     return {key: value for key, value in tags.items() if value}
 
 
-def _record_fit(mlflow: Any, fit: Fit, source: Mapping[str, str], register: str | None) -> None:
-    """One child run: parameters, metrics, dataset, model with its signature."""
-    from mlflow.models import infer_signature
+def _git_commit() -> str:
+    """Commit of the working folder, marked where files differ from it; empty outside of Git."""
+    try:
+        commit = _git("rev-parse", "HEAD")
+        return f"{commit}-dirty" if _git("status", "--porcelain", "-uno") else commit
+    except (OSError, subprocess.SubprocessError):
+        return ""
 
-    spec = fit.spec
-    tags = {**_tags(source, "train"), "spec.sha256": spec.sha256()}
+
+def _git(*arguments: str) -> str:
+    done = subprocess.run(
+        ["git", *arguments], capture_output=True, text=True, timeout=10, check=True
+    )
+    return done.stdout.strip()
+
+
+def _log_files(mlflow: Any, files: Sequence[Path]) -> None:
+    for path in files:
+        mlflow.log_artifact(str(path))
+
+
+def _record_fit(
+    mlflow: Any,
+    fit: Fit,
+    files: Sequence[Path],
+    curve: Sequence[LearningPoint] = (),
+    register: str | None = None,
+) -> None:
+    """One child run: settings, metrics, learning curve, files, dataset, model with signature."""
+    spec, source = fit.spec, fit.table.source
+    tags = {**_tags(source, "fit"), "spec.sha256": spec.sha256(), "spec": spec.name}
     run_name = f"{spec.kind}/{spec.name}/{fit.restart.seed}"
-    with mlflow.start_run(run_name=run_name, nested=True, tags=tags):
+    with mlflow.start_run(run_name=run_name, nested=True, tags=tags) as run:
         mlflow.log_params({key: str(v) for key, v in spec.model_dump(mode="json").items()})
         mlflow.log_params({f"rows_{split}": len(fit.table.rows(split)) for split in SPLITS})
         mlflow.log_metrics(_metrics(fit))
-        train = fit.table.rows("train")
-        inputs = fit.table.frame.iloc[train]
-        outputs = fit.estimator.predict(inputs.head(2))
-        names = list(fit.table.target_names)
-        mlflow.log_input(
-            mlflow.data.from_pandas(
-                inputs.assign(**dict(zip(names, fit.table.targets[train].T, strict=True))),
-                name=source.get("name", "dataset"),
-                digest=source.get("content_sha256", "")[:36] or None,
-            ),
-            context="training",
-        )
-        info = mlflow.sklearn.log_model(
-            fit.estimator,
-            name="model",
-            signature=infer_signature(inputs.head(2), _frame(outputs, names)),
-            pip_requirements=_requirements(),
-            skops_trusted_types=_TRUSTED_TYPES,
-        )
-        if register:
-            _register(mlflow.MlflowClient(), register, info)
+        _log_curve(mlflow, run.info.run_id, curve)
+        _log_files(mlflow, files)
+        mlflow.log_input(_dataset(mlflow, fit), context="training")
+        model_uri, flavour = log_model(mlflow, fit)
+        mlflow.set_tag("model.flavour", flavour)
+        if register and model_uri:
+            _register(mlflow.MlflowClient(), register, model_uri, run.info.run_id)
 
 
-def _register(client: Any, name: str, info: Any) -> None:
+def _dataset(mlflow: Any, fit: Fit) -> Any:
+    """Training rows with their hash, as MLflow notes them."""
+    table, train = fit.table, fit.table.rows("train")
+    targets = dict(zip(table.target_names, table.targets[train].T, strict=True))
+    return mlflow.data.from_pandas(
+        table.frame.iloc[train].assign(**targets),
+        name=table.source.get("name", "dataset"),
+        digest=table.source.get("content_sha256", "")[:36] or None,
+    )
+
+
+def _log_curve(mlflow: Any, run_id: str, curve: Sequence[LearningPoint]) -> None:
+    """Learning curve as metrics whose step is the number of training rows, in one call."""
+    from mlflow.entities import Metric
+
+    metrics = [
+        Metric(f"curve_{part}_p95_rel_err_{target}", entry.relative_error_95, 0, point.rows)
+        for point in curve
+        for part, scores in (("train", point.train), ("test", point.test))
+        for target, entry in scores.items()
+        if math.isfinite(entry.relative_error_95)
+    ]
+    if metrics:
+        mlflow.MlflowClient().log_batch(run_id, metrics=metrics)
+
+
+def _register(client: Any, name: str, model_uri: str, run_id: str) -> None:
     """Make the logged model the champion of its name; the client does it without chatter."""
     if not client.search_registered_models(filter_string=f"name = '{name}'"):
         client.create_registered_model(name)
-    made = client.create_model_version(name, source=info.model_uri, run_id=info.run_id)
+    made = client.create_model_version(name, source=model_uri, run_id=run_id)
     client.set_registered_model_alias(name, "champion", made.version)
 
 
-def _frame(values: Any, names: list[str]) -> Any:
-    import pandas as pd
-
-    return pd.DataFrame(values.reshape(-1, len(names)), columns=names)
-
-
-def _requirements() -> list[str]:
-    from importlib.metadata import version
-
-    return [f"{name}=={version(name)}" for name in ("scikit-learn", "numpy", "pandas")]
-
-
 def _metrics(fit: Fit) -> dict[str, float]:
-    metrics = {
+    metrics: dict[str, float | None] = {
         "fit_seconds": fit.seconds,
         "valid_error": fit.restart.valid_error,
         "iterations": float(fit.restart.iterations),
@@ -175,4 +240,13 @@ def _metrics(fit: Fit) -> dict[str, float]:
     document = fit.to_document()
     for target, covered in document["band_coverage_on_test"].items():
         metrics[f"band_coverage_{target}"] = covered
-    return metrics
+    return _finite(metrics)
+
+
+def _finite(metrics: Mapping[str, float | int | None]) -> dict[str, float]:
+    """Leave out what the store of MLflow cannot hold."""
+    return {
+        name: float(value)
+        for name, value in metrics.items()
+        if value is not None and math.isfinite(value)
+    }

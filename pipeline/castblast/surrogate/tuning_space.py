@@ -72,7 +72,7 @@ def candidate(spec: ModelSpec, settings: Mapping[str, Any], name: str = "") -> M
         The family refuses the settings.
     """
     content = {**spec.model_dump(mode="json"), **settings, "name": name or spec.name}
-    return make_spec(content, type(spec), spec.name)
+    return make_spec(content, type(spec), spec.name, folder=getattr(spec, "folder", None))
 
 
 def _texts(entry: Choices) -> list[str]:

@@ -1,0 +1,351 @@
+"""The whole comparison of models on one dataset: fits, gate, league, curves, shifts, indices.
+
+What takes long is kept (fits in their folders, the rest under ``parts``), so that a comparison
+which was stopped goes on and a second one only writes. ``comparison.json`` and all pictures are a
+function of dataset, specs and code; times are in ``timings.json``.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from castblast.errors import DatasetError, SpecError
+from castblast.progress import ProgressCallback, silent
+from castblast.resources import resource
+from castblast.stages.compare_parts import (
+    Done,
+    Part,
+    curve_part,
+    probe_part,
+    run_parts,
+    shift_part,
+    sobol_part,
+)
+from castblast.stages.fitting import fit_all, fit_files, kept_fits, note_dataset, read_rows
+from castblast.stages.reuse import file_hash
+from castblast.stages.train import RUNS_FOLDER, TrainOutcome
+
+if TYPE_CHECKING:
+    from castblast.specs.model import ModelSpec
+    from castblast.surrogate.features import Table
+    from castblast.surrogate.training import Fit
+
+
+@dataclass(frozen=True)
+class Extent:
+    """How much a comparison does.
+
+    Attributes
+    ----------
+    name : str
+    train_rows : int or None
+        Training rows at most; the other splits stay.
+    quick_specs : bool
+        Fit every spec in the quick form of its family.
+    every_curve : bool
+        A learning curve for every model, not for the chosen one alone.
+    curve_sizes : tuple of int
+        Training rows of the curves.
+    shifts : bool
+        Refit the chosen model without one explosive, corner or group after the other.
+    probe_points, dense_points : int
+        Places where the simulator and the surrogates are asked for the physics gate.
+    sobol_rows, checked_rows : int
+        Base samples of the Sobol indices and of their check by the simulator; 0: none.
+    """
+
+    name: str
+    train_rows: int | None = None
+    quick_specs: bool = False
+    every_curve: bool = True
+    curve_sizes: tuple[int, ...] = (250, 500, 1000, 2000, 4000)
+    shifts: bool = True
+    probe_points: int = 1024
+    dense_points: int = 8192
+    sobol_rows: int = 8192
+    checked_rows: int = 1024
+
+    def stated(self) -> dict[str, Any]:
+        """What was left out, as plain JSON values."""
+        return {**vars(self), "curve_sizes": list(self.curve_sizes)}
+
+
+FULL = Extent("full")
+#: For a first look, in two minutes: fewer rows, iterations and starts.
+QUICK = Extent(
+    "quick",
+    train_rows=2000,
+    quick_specs=True,
+    every_curve=False,
+    curve_sizes=(250, 500, 1000),
+    shifts=False,
+    probe_points=128,
+    dense_points=2048,
+    sobol_rows=1024,
+    checked_rows=0,
+)
+#: What the demo has time for.
+DEMO = Extent(
+    "demo", every_curve=False, shifts=False, probe_points=128, dense_points=2048,
+    sobol_rows=1024, checked_rows=0,
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What was found out, as the writers take it.
+
+    Attributes
+    ----------
+    fits : list of Fit
+    table : Table
+    league : dict
+        From `surrogate.comparison.compare`.
+    gates : mapping of name to dict
+        Empty where the domain is not known.
+    chosen : Fit
+        The chosen one; the best exportable one where all fail the gate.
+    curves : mapping of name to list of LearningPoint
+    shifts : mapping of name to dict
+    sobol : dict or None
+    remarks : list of str
+        What could not be done, and why.
+    seconds : mapping of part to float
+        As measured when the part was made.
+    extent : Extent
+    """
+
+    fits: list[Fit]
+    table: Table
+    league: dict[str, Any]
+    gates: Mapping[str, dict[str, Any]]
+    chosen: Fit
+    curves: Mapping[str, Any]
+    shifts: Mapping[str, dict[str, Any]]
+    sobol: dict[str, Any] | None
+    remarks: list[str]
+    seconds: Mapping[str, float]
+    extent: Extent
+
+
+def compare(
+    dataset: Path,
+    specs: Sequence[Path] = (),
+    out: Path | None = None,
+    *,
+    fits: Path | None = None,
+    extent: Extent = FULL,
+    workers: int | None = None,
+    tracking: bool = False,
+    runs: Path = RUNS_FOLDER,
+    progress: ProgressCallback = silent,
+) -> TrainOutcome:
+    """Fit what is not fitted yet, judge all models and choose one.
+
+    Parameters
+    ----------
+    dataset : path
+        NetCDF written by `castblast generate`, or a folder of fits made from one.
+    specs : sequence of path
+        Model specs (YAML) or folders of them; none: those of the folder of fits, or all that come
+        with castblast.
+    out : path, optional
+        Folder for ``comparison.json``, ``report.html`` and pictures; default ``comparison``
+        beside the dataset.
+    fits : path, optional
+        Folder of the fits; default ``fits`` beside the dataset.
+    extent : Extent
+    workers : int, optional
+        Fits and parts at a time; None: the cores there are. Changes no number.
+    tracking : bool
+        Keep a record in MLflow under `runs`; changes no result.
+    progress : callable
+
+    Raises
+    ------
+    SpecError
+        An unusable spec; no model that can be exported and passes the gate.
+    DatasetError
+        An unusable dataset.
+    """
+    from castblast.dataset.store import open_dataset, require_writable
+    from castblast.stages.compare_report import outcome, write_comparison
+
+    started = time.perf_counter()
+    if dataset.is_dir():
+        fits = dataset if fits is None else fits
+        dataset, wanted = kept_fits(dataset)
+        wanted = _read_specs(specs) if specs else wanted
+    else:
+        wanted = _read_specs(specs)
+    if extent.quick_specs:
+        wanted = [spec.quick() for spec in wanted]
+    table = read_rows(open_dataset(dataset), wanted, dataset)
+    if extent.train_rows is not None:
+        table = table.with_train_rows(extent.train_rows)
+    suffix = "" if extent is FULL else f"_{extent.name}"
+    fits = dataset.parent / f"fits{suffix}" if fits is None else fits
+    out = dataset.parent / f"comparison{suffix}" if out is None else out
+    for folder in (fits, out):
+        require_writable(folder)
+    note_dataset(fits, dataset)
+    made = fit_all(wanted, table, fits, workers=workers, progress=_span(progress, 0.0, 0.5))
+    found = _judge(made, table, dataset, fits, extent, workers, _span(progress, 0.5, 0.95))
+    progress(0.95, "writing the report")
+    files = write_comparison(out, found, time.perf_counter() - started)
+    if tracking:
+        from castblast.surrogate.tracking import MlflowTracker
+
+        kept = {fit.spec.name: fit_files(fits / fit.spec.name) for fit in made}
+        MlflowTracker(runs).record_comparison(made, found.league, {**kept, "": files}, found.curves)
+    progress(1.0, f"chosen: {found.chosen.spec.name}")
+    return outcome(found, out)
+
+
+def _read_specs(given: Sequence[Path]) -> list[ModelSpec]:
+    """Read specs from files and folders; none given: the shipped ones."""
+    from castblast.specs.model import read_model_specs
+
+    paths: list[Path] = []
+    for path in given or [resource("models/specs")]:
+        inside = sorted(path.glob("*.yaml")) if path.is_dir() else [path]
+        if not inside:
+            message = f"{path}: holds no model spec (*.yaml)"
+            raise SpecError(message)
+        paths += inside
+    return read_model_specs(paths)
+
+
+def _span(progress: ProgressCallback, low: float, high: float) -> ProgressCallback:
+    return lambda share, line: progress(low + (high - low) * share, line)
+
+
+def _judge(
+    fits: list[Fit],
+    table: Table,
+    dataset: Path,
+    folder: Path,
+    extent: Extent,
+    workers: int | None,
+    progress: ProgressCallback,
+) -> Comparison:
+    """Gate and league, then what is asked of the chosen model only."""
+    from castblast.surrogate.comparison import compare as league_of
+    from castblast.surrogate.gate import check_physics
+
+    remarks: list[str] = []
+    domain = _domain_or_remark(dataset, remarks)
+    about = {"dataset": file_hash(dataset)}
+    parts = [_curve(fit, table, about, extent) for fit in fits if extent.every_curve]
+    if domain:
+        sizes = (extent.probe_points, extent.dense_points)
+        parts.append(Part("probe", probe_part, (dataset, *sizes), {**about, "sizes": sizes}))
+    kept = folder / "parts"
+    done = run_parts(parts, kept, workers=workers, progress=_span(progress, 0.0, 0.6))
+    gates: dict[str, dict[str, Any]] = {}
+    if domain:
+        probe = done["probe"].value
+        gates = {fit.spec.name: check_physics(fit, probe) for fit in fits}
+    league = league_of(fits, gates)
+    first = league["chosen"] or league["best_exportable"]
+    chosen = next(fit for fit in fits if fit.spec.name == first)
+    known = dataset if domain else None
+    parts = _parts_of_chosen(chosen, table, known, about, extent)
+    parts += _shift_parts(_shifted(chosen, fits, league), table, known, about, extent)
+    parts = [part for part in parts if part.name not in done]
+    done |= run_parts(parts, kept, workers=workers, progress=_span(progress, 0.6, 1.0))
+    return Comparison(
+        fits=fits,
+        table=table,
+        league=league,
+        gates=gates,
+        chosen=chosen,
+        curves=_curves(fits, done),
+        shifts={
+            name.removeprefix("shifts_"): part.value
+            for name, part in done.items()
+            if name.startswith("shifts_")
+        },
+        sobol=_value(done, f"sobol_{chosen.spec.name}"),
+        remarks=remarks,
+        seconds={name: part.seconds for name, part in done.items()},
+        extent=extent,
+    )
+
+
+def _domain_or_remark(dataset: Path, remarks: list[str]) -> bool:
+    """Whether the dataset says from which domain it comes; if not, what is left out for that."""
+    from castblast.stages.compare_parts import open_domain
+
+    try:
+        open_domain(dataset)
+    except (DatasetError, SpecError) as fault:
+        remarks.append(f"no physics gate and no Sobol indices: {fault}")
+        return False
+    return True
+
+
+def _identity(fit: Fit, about: Mapping[str, Any]) -> dict[str, Any]:
+    from castblast.surrogate.fit_store import fit_key
+
+    return {**about, **fit_key(fit.spec, fit.table)}
+
+
+def _curve(fit: Fit, table: Table, about: Mapping[str, Any], extent: Extent) -> Part:
+    return Part(
+        f"curve_{fit.spec.name}",
+        curve_part,
+        (fit, table, extent.curve_sizes),
+        {**_identity(fit, about), "sizes": extent.curve_sizes},
+    )
+
+
+def _parts_of_chosen(
+    fit: Fit, table: Table, dataset: Path | None, about: Mapping[str, Any], extent: Extent
+) -> list[Part]:
+    name, identity = fit.spec.name, _identity(fit, about)
+    parts = [_curve(fit, table, about, extent)]
+    if extent.sobol_rows and dataset is not None:
+        sizes = (extent.sobol_rows, extent.checked_rows)
+        inputs = {**identity, "sizes": sizes}
+        parts.append(Part(f"sobol_{name}", sobol_part, (fit, dataset, *sizes), inputs))
+    return parts
+
+
+def _shifted(chosen: Fit, fits: Sequence[Fit], league: Mapping[str, Any]) -> list[Fit]:
+    """The chosen fit, and the best of those that can be asked for an explosive never shown."""
+    from castblast.surrogate.shifts import describes_explosives
+
+    named = {fit.spec.name: fit for fit in fits}
+    ranked = [named[entry["name"]] for entry in league["league"]]
+    able = [fit for fit in ranked if describes_explosives(fit.spec)]
+    return list(dict.fromkeys([chosen, *able[:1]]))
+
+
+def _shift_parts(
+    fits: Sequence[Fit],
+    table: Table,
+    dataset: Path | None,
+    about: Mapping[str, Any],
+    extent: Extent,
+) -> list[Part]:
+    if not extent.shifts:
+        return []
+    return [
+        Part(f"shifts_{fit.spec.name}", shift_part, (fit, table, dataset), _identity(fit, about))
+        for fit in fits
+    ]
+
+
+def _curves(fits: Sequence[Fit], done: Mapping[str, Done]) -> dict[str, Any]:
+    """Learning curves in the order of the fits."""
+    names = [fit.spec.name for fit in fits]
+    return {name: done[f"curve_{name}"].value for name in names if f"curve_{name}" in done}
+
+
+def _value(done: Mapping[str, Done], name: str) -> dict[str, Any] | None:
+    return done[name].value if name in done else None

@@ -1,0 +1,337 @@
+"""A comparison as one page for people, in the order in which they ask."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from castblast import __version__
+from castblast.report.html import Picture, Section, Table, write_report
+from castblast.stages.train import show_r_squared, show_share
+from castblast.variables import VARIABLES
+
+Document = Mapping[str, Any]
+_CAPTIONS = {
+    "figure_2": "Learning curve, error histogram, predicted against simulated: {folder}",
+    "league": "League table: 95 % relative error per target, bars are 95 % intervals",
+    "error_maps": "Where the chosen model errs: 95 % relative error over pairs of inputs",
+    "sobol": "Sobol indices of the chosen model",
+    "shifts": "Beyond random splits: error where a kind of rows was never shown",
+}
+
+
+def write_page(path: Path, document: Document, costs: Document, files: Sequence[Path]) -> Path:
+    """Render a comparison.
+
+    Parameters
+    ----------
+    path : path
+    document : mapping
+        As in ``comparison.json``.
+    costs : mapping
+        From `surrogate.timing.timings`.
+    files : sequence of path
+        Those already written; the pictures among them are shown.
+    """
+    pictures = [file for file in files if file.suffix == ".png"]
+    source = document["dataset"]
+    sections = [
+        _league(document, costs, pictures),
+        _marks(document),
+        _gate(document),
+        _learning(document, pictures),
+        _shifts(document, pictures),
+        _strata(document, pictures),
+        _worst(document),
+        _sobol(document, pictures),
+        Section("What this says and what it does not", points=_LIMITS),
+    ]
+    lead = (
+        f"Models of dataset {source.get('name', '(unnamed)')} "
+        f"{source.get('dataset_version', '')} (content "
+        f"{source.get('content_sha256', 'unknown')[:12]}), judged on {document['test_rows']:,} "
+        f"test rows never trained on. Made by castblast {__version__}."
+    )
+    shown = [section for section in sections if section is not None]
+    return write_report(path, "castblast: comparison of models", lead, shown)
+
+
+_LIMITS = (
+    "Errors are relative to the simulated value: they say how well a model repeats the "
+    "simulations, not how well these are a blast.",
+    "The choice is made on validation rows; test rows are only reported.",
+    "Two models that the test rows cannot tell apart are named as such: the order between them "
+    "is luck.",
+    "Times were taken on the machine that made this page.",
+)
+
+
+def _league(document: Document, costs: Document, pictures: Sequence[Path]) -> Section:
+    targets = document["targets"]
+    header = [
+        "model", "gate", "export", "not distinguishable from the first",
+        *(f"{_words(name)}: R², 95 %" for name in targets),
+        "weights", "fit [s]", "row [µs]",
+    ]  # fmt: skip
+    rows = []
+    for entry in document["league"]:
+        cost = costs.get(entry["name"], {})
+        rows.append(
+            [
+                entry["name"] + (" (chosen)" if entry["name"] == document["chosen"] else ""),
+                {True: "passed", False: "failed", None: "not asked"}[entry["gate_passed"]],
+                "yes" if entry["exportable"] else "no",
+                "" if entry["distinguishable_from_first"] else "same",
+                *(_figures(entry["targets"][name]) for name in targets),
+                "" if entry["parameters"] is None else f"{entry['parameters']:,}",
+                _number(cost.get("fit_seconds")),
+                _number(cost.get("network_row") or cost.get("row")),
+            ]
+        )
+    chosen = document["chosen"] or "none: no model that can be exported passes the gate"
+    gap = document["gap"]
+    paragraphs = [f"Chosen: {chosen} ({document['rule']})."]
+    if gap > 1.0:
+        paragraphs.append(
+            f"Its validation error is {gap:.2f} times that of {document['best_overall']}, the "
+            "best overall."
+        )
+    paragraphs.append(_extent(document["extent"]))
+    paper = document["paper"]
+    caption = (
+        f"Best validation error first; intervals: {document['interval']}. Published for "
+        f"{_words(paper['target'])}: R² {paper['r2']}, 95 % within "
+        f"{paper['relative_error_95']:.1%} from {paper['runs']:,} runs."
+    )
+    return Section(
+        "League table",
+        paragraphs,
+        [Table(header, rows, caption)],
+        _pictures(pictures, "league"),
+        document["remarks"],
+    )
+
+
+def _extent(extent: Document) -> str:
+    if extent["name"] == "full":
+        return "Extent: full."
+    rows = f"at most {extent['train_rows']:,} training rows; " if extent["train_rows"] else ""
+    shifts = "" if extent["shifts"] else "no tests beyond random splits; "
+    specs = "specs fitted in their quick form; " if extent["quick_specs"] else ""
+    return (
+        f"Extent: {extent['name']}: {rows}{specs}{shifts}physics asked at "
+        f"{extent['probe_points']:,} points. A full comparison says more."
+    )
+
+
+def _figures(entry: Document) -> str:
+    low, high = (show_share(value) for value in entry["relative_error_95_interval"])
+    return (
+        f"{show_r_squared(entry['r2'])}, {show_share(entry['relative_error_95'])} "
+        f"({low.removesuffix('%')}-{high})"
+    )
+
+
+def _marks(document: Document) -> Section:
+    rows = []
+    for entry in document["league"]:
+        for target in document["targets"]:
+            figures = entry["targets"][target]
+            mark = figures["mark"]
+            if entry["name"] in (document["chosen"], document["best_overall"]):
+                rows.append(
+                    [
+                        entry["name"],
+                        _words(target),
+                        f"{mark['r2']:g}",
+                        show_r_squared(figures["r2"]),
+                        show_share(mark["relative_error_95"]),
+                        show_share(figures["relative_error_95"]),
+                        "met" if mark["met"] else "missed",
+                        _number(mark["error_over_mark"]),
+                        _number(mark["variance_left_over_mark"]),
+                    ]
+                )
+    header = [
+        "model", "target", "R² asked", "R²", "95 % asked", "95 %", "mark",
+        "error over mark", "variance left over mark",
+    ]  # fmt: skip
+    caption = "Marks on test rows; 1 or less in the last two columns is met"
+    return Section("Marks", tables=[Table(header, rows, caption)])
+
+
+def _gate(document: Document) -> Section | None:
+    if not document["gate"]:
+        return None
+    points = [
+        f"{name}: {'passed' if gate['passed'] else '; '.join(gate['reasons'])}"
+        for name, gate in document["gate"].items()
+    ]
+    first = document["chosen"] or document["best_exportable"]
+    rows = [
+        [
+            check["name"],
+            check["says"],
+            f"{check['asked']:,}" if check["asked"] else check.get("not_asked", ""),
+            f"{check['broken']:,}" if check["asked"] else "",
+        ]
+        for check in document["gate"][first]["checks"]
+    ]
+    table = Table(("rule", "means", "asked", "broken"), rows, f"Asked of {first}")
+    return Section(
+        "Physics gate",
+        ["What every answer must obey, all over the joint domain of the dataset. A rule that the "
+         "simulator itself breaks is not asked. A model that fails is not chosen."],
+        [table],
+        points=points,
+    )  # fmt: skip
+
+
+def _learning(document: Document, pictures: Sequence[Path]) -> Section:
+    rows = []
+    for name, report in document["learning"].items():
+        for target, entry in report.items():
+            needed = entry["runs_for_mark"]
+            rows.append(
+                [
+                    name,
+                    _words(target),
+                    show_share(entry["mark"]),
+                    "-" if entry["reached_at"] is None else f"{entry['reached_at']:,.0f}",
+                    "-" if needed is None else f"{needed:,.0f}",
+                    entry["advice"],
+                ]
+            )
+    met = [
+        f"{name}: the published figures are "
+        + (f"met from {rows:,} training rows on" if rows else "not met with the rows there are")
+        for name, rows in document["paper_met_from"].items()
+    ]
+    header = ("model", "target", "mark, 95 %", "met from rows", "law says rows", "advice")
+    return Section(
+        "How many runs are enough?",
+        ["A power law through the learning curve on test rows; nothing is promised where it does "
+         "not describe the points."],
+        [Table(header, rows)],
+        _pictures(pictures, "figure_2"),
+        met,
+    )  # fmt: skip
+
+
+def _shifts(document: Document, pictures: Sequence[Path]) -> Section | None:
+    if not document["shifts"]:
+        return None
+    rows = []
+    for name, shifts in document["shifts"].items():
+        for test in shifts["tests"]:
+            cells = (
+                [test["not_run"], "", "", ""]
+                if "not_run" in test
+                else [
+                    f"{test['judged_rows']:,}",
+                    show_share(test["error"]),
+                    show_share(test["error_when_seen"]),
+                    _number(test["ratio"]),
+                ]
+            )
+            rows.append([name, test["kind"], test["says"], *cells])
+    header = ("model", "kind", "never shown", "judged rows", "95 % unseen", "95 % seen", "ratio")
+    return Section(
+        "Beyond random splits",
+        ["The model is fitted again without one kind of rows and judged on test rows of that "
+         "kind, beside the fit that saw such rows. Errors are geometric means over the targets."],
+        [Table(header, rows)],
+        _pictures(pictures, "shifts"),
+    )  # fmt: skip
+
+
+def _strata(document: Document, pictures: Sequence[Path]) -> Section:
+    targets = document["targets"]
+    tables = []
+    kinds = document["strata"]["by_explosive"]
+    rows = [[_words(k), *(_share_of(s, t) for t in targets)] for k, s in _scored(kinds)]
+    tables.append(Table(("explosive", *map(_words, targets)), rows, "95 % relative error"))
+    for name, cells in document["strata"]["by_input"].items():
+        variable = VARIABLES[name]
+        rows = [
+            [
+                f"{variable.show(cell['lower'])} to {variable.show(cell['upper'])}",
+                *(_share_of(cell["targets"], target) for target in targets),
+            ]
+            for cell in cells
+        ]
+        tables.append(Table((_words(name), *map(_words, targets)), rows))
+    return Section(
+        "Where the chosen model errs", tables=tables, pictures=_pictures(pictures, "error_maps")
+    )
+
+
+def _scored(kinds: Any) -> list[tuple[str, Document]]:
+    """Scores by explosive, however they are nested."""
+    return [(name, entry.get("targets", entry)) for name, entry in kinds.items()]
+
+
+def _share_of(scores: Document, target: str) -> str:
+    return show_share(scores[target]["relative_error_95"]) if target in scores else ""
+
+
+def _worst(document: Document) -> Section:
+    rows = [
+        [
+            f"{case['sample']}",
+            _words(case["explosive"]),
+            _words(case["target"]),
+            "-" if case["relative_error"] is None else f"{case['relative_error']:+.2%}",
+            "inside" if case["in_domain"] else "outside",
+            f"{_words(case['edge']['input'])} at {case['edge']['place']:.0%}",
+            ", ".join(f"{_words(n)} {VARIABLES[n].show(v)}" for n, v in case["inputs"].items()),
+        ]
+        for case in document["worst_cases"]
+    ]
+    header = ("sample", "explosive", "target", "error", "training domain", "nearest end", "inputs")
+    return Section("The ten worst test rows", tables=[Table(header, rows)])
+
+
+def _sobol(document: Document, pictures: Sequence[Path]) -> Section | None:
+    sobol = document["sobol"]
+    if not sobol:
+        return None
+    tables = []
+    for part, caption in (("indices", "of the chosen model"), ("physics", "of the simulator")):
+        for target, inputs in (sobol.get(part) or {}).items():
+            rows = [
+                [_words(name), *(_index(entry, kind) for kind in ("first", "total"))]
+                for name, entry in inputs.items()
+                if isinstance(entry, Mapping) and "first" in entry
+            ]
+            if rows:
+                title = f"{_words(target)}, {caption}"
+                tables.append(Table(("input", "first order", "total"), rows, title))
+    return Section(
+        "Which inputs matter: Sobol indices",
+        [str(sobol.get("method", ""))],
+        tables,
+        _pictures(pictures, "sobol"),
+    )
+
+
+def _index(entry: Document, kind: str) -> str:
+    low, high = entry[f"{kind}_interval"]
+    return f"{entry[kind]:.3f} ({low:.3f} to {high:.3f})"
+
+
+def _pictures(pictures: Sequence[Path], stem: str) -> list[Picture]:
+    return [
+        Picture(path, _CAPTIONS[stem].format(folder=path.parent.name))
+        for path in pictures
+        if path.stem == stem
+    ]
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"

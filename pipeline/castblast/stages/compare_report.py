@@ -1,0 +1,167 @@
+"""Files of a comparison: the document, pictures, one page for people, lines for the screen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from castblast.files import write_csv, write_text
+from castblast.stages.compare_page import write_page
+from castblast.stages.fitting import fit_title, held_out, write_json
+from castblast.stages.train import TrainOutcome, show_r_squared, show_share
+
+if TYPE_CHECKING:
+    from castblast.stages.compare import Comparison
+    from castblast.surrogate.training import Fit
+
+_HEADLINE = "burden_velocity"
+
+
+def write_comparison(out: Path, found: Comparison, seconds: float) -> list[Path]:
+    """Write everything into a folder; the files, times last.
+
+    Parameters
+    ----------
+    out : path
+    found : Comparison
+    seconds : float
+        Wall time of the whole comparison so far.
+    """
+    from castblast.export.json_file import to_json
+    from castblast.surrogate.timing import timings
+
+    document = comparison_document(found)
+    files = [write_json(out / "comparison.json", document)]
+    for fit in found.fits:
+        if fit.spec.name in found.curves:
+            files += _write_curve(out / fit.spec.name, fit, found.curves[fit.spec.name])
+    files += _draw(out, found, document)
+    network = out / "network.json"
+    if found.league["chosen"] and found.chosen.network is not None:
+        files.append(write_text(network, to_json(found.chosen.network)))
+    else:
+        network.unlink(missing_ok=True)
+    costs = timings(found.fits)
+    files.append(write_page(out / "report.html", document, costs, files))
+    times = {"models": costs, "parts": dict(found.seconds), "comparison_seconds": seconds}
+    files.append(write_json(out / "timings.json", times))
+    return files
+
+
+def comparison_document(found: Comparison) -> dict[str, Any]:
+    """Everything found out as plain JSON values; no times, no paths."""
+    from castblast.surrogate.comparison import mark_of
+    from castblast.surrogate.learning import learning_report
+    from castblast.surrogate.strata import strata, worst_cases
+
+    marks = {name: mark_of(name).relative_error_95 for name in found.league["targets"]}
+    return {
+        **found.league,
+        "extent": found.extent.stated(),
+        "remarks": list(found.remarks),
+        "gate": dict(found.gates),
+        "paper_met_from": {
+            name: paper_met_from(curve, found.league["paper"])
+            for name, curve in found.curves.items()
+        },
+        "learning": {name: learning_report(curve, marks) for name, curve in found.curves.items()},
+        "shifts": dict(found.shifts),
+        "strata": strata(found.chosen),
+        "worst_cases": worst_cases(found.chosen),
+        "sobol": found.sobol,
+    }
+
+
+def paper_met_from(curve: Sequence[Any], paper: Mapping[str, Any]) -> int | None:
+    """Fewest training rows from which on all points meet the published figures on test rows."""
+    met_from = None
+    for point in reversed(curve):
+        score = point.test.get(paper["target"])
+        if score is None or not (
+            score.r2 >= paper["r2"] and score.relative_error_95 <= paper["relative_error_95"]
+        ):
+            break
+        met_from = point.rows
+    return met_from
+
+
+def _write_curve(folder: Path, fit: Fit, curve: Sequence[Any]) -> list[Path]:
+    """Learning curve as a table and the paper's Figure 2."""
+    from castblast.report.surrogate_figures import LearningLine, draw_figure_two
+    from castblast.surrogate.comparison import PAPER_MARKS
+
+    sizes = [point.rows for point in curve]
+    columns: dict[str, Any] = {"train_rows": sizes}
+    lines = []
+    for name in fit.table.target_names:
+        train = [point.train[name].relative_error_95 for point in curve]
+        test = [point.test[name].relative_error_95 for point in curve]
+        columns[f"{name}_train_relative_error_95"] = train
+        columns[f"{name}_test_relative_error_95"] = test
+        columns[f"{name}_test_r2"] = [point.test[name].r2 for point in curve]
+        lines.append(LearningLine(name, sizes, train, test))
+    headline = _HEADLINE if _HEADLINE in fit.table.target_names else fit.table.target_names[0]
+    picture = draw_figure_two(
+        folder / "figure_2.png",
+        fit_title(fit),
+        lines,
+        held_out(fit),
+        target=headline,
+        marks=PAPER_MARKS,
+    )
+    return [write_csv(folder / "learning_curve.csv", columns), picture]
+
+
+def _draw(out: Path, found: Comparison, document: Mapping[str, Any]) -> list[Path]:
+    """Pictures of the league, the error maps and the indices."""
+    return []
+
+
+def outcome(found: Comparison, out: Path) -> TrainOutcome:
+    """What the screen shows of a comparison."""
+    league = found.league
+    targets, paper = league["targets"], league["paper"]
+    header = ["model", "gate", *(f"{name.replace('_', ' ')}: R², 95 %" for name in targets)]
+    rows = []
+    for entry in league["league"]:
+        cells = [
+            f"{show_r_squared(figures['r2'])}, {show_share(figures['relative_error_95'])}"
+            for figures in entry["targets"].values()
+        ]
+        mark = " *" if entry["name"] == league["chosen"] else ""
+        gate = {True: "passed", False: "failed", None: "-"}[entry["gate_passed"]]
+        if not entry["exportable"]:
+            gate += ", no export"
+        rows.append([entry["name"] + mark, gate, *cells])
+    mark = f"{paper['r2']:.4f}, {paper['relative_error_95']:.1%}"
+    rows.append(
+        ["paper, 10,000 runs", "", *(mark if t == paper["target"] else "" for t in targets)]
+    )
+    title = f"{league['test_rows']:,} test rows never trained on"
+    document = {**comparison_document(found), "out": str(out)}
+    return TrainOutcome(document, title, header, rows, _lines(found, out))
+
+
+def _lines(found: Comparison, out: Path) -> list[str]:
+    league = found.league
+    if league["chosen"] is None:
+        lines = ["no model that can be exported passes the physics gate: none is chosen"]
+        first = league["best_exportable"]
+        reasons = found.gates[first]["reasons"]
+        lines += [f"{first}: {reason}" for reason in reasons[:3]]
+    else:
+        lines = [f"* chosen: {league['rule']}"]
+    if league["gap"] > 1.0:
+        lines.append(
+            f"its validation error is {league['gap']:.2f} times that of the best overall, "
+            f"{league['best_overall']}"
+        )
+    for name, curve in found.curves.items():
+        rows = paper_met_from(curve, league["paper"])
+        lines.append(
+            f"{name}: the published figures are not met with {curve[-1].rows:,} training rows"
+            if rows is None
+            else f"{name}: the published figures are met from {rows:,} training rows on"
+        )
+    return [*lines, *found.remarks, f"wrote {out / 'report.html'}"]

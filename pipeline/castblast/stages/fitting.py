@@ -1,0 +1,197 @@
+"""Fit several specs on one table, some at a time, and keep what is finished.
+
+Each fit has a folder of its own. All files in it but ``fit.pickle`` are a function of rows and
+spec: no times, no paths.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from castblast.errors import DatasetError, SpecError
+from castblast.files import write_csv, write_text
+from castblast.progress import ProgressCallback, silent
+from castblast.stages.jobs import Job, available_cores, run_jobs
+
+if TYPE_CHECKING:
+    from castblast.report.surrogate_figures import HeldOutRows
+    from castblast.specs.model import ModelSpec
+    from castblast.surrogate.features import Table
+    from castblast.surrogate.training import Fit
+
+_STORE = "fit.pickle"
+_DATASET = "dataset.txt"
+
+
+def read_rows(dataset: Any, specs: Sequence[ModelSpec], path: Path) -> Table:
+    """Read every column that one of the specs asks for.
+
+    Raises
+    ------
+    DatasetError
+        As `read_table`, with the path in front of every line.
+    """
+    from castblast.surrogate.features import read_table
+
+    features = dict.fromkeys(name for spec in specs for name in spec.features)
+    targets = dict.fromkeys(name for spec in specs for name in spec.targets)
+    try:
+        return read_table(dataset, tuple(features), tuple(targets))
+    except DatasetError as fault:
+        lines = "\n".join(f"{path}: {line}" for line in str(fault).splitlines())
+        raise DatasetError(lines) from None
+
+
+def fit_all(
+    specs: Sequence[ModelSpec],
+    table: Table,
+    folder: Path,
+    *,
+    workers: int | None = None,
+    progress: ProgressCallback = silent,
+) -> list[Fit]:
+    """Give a fit of every spec, in order; those kept in `folder` are not made again.
+
+    Parameters
+    ----------
+    specs : sequence of ModelSpec
+    table : Table
+        Holds the features and targets of all specs.
+    folder : path
+        Every fit goes to ``folder/<name>`` as soon as it is finished.
+    workers : int, optional
+        Fits at a time, each in a process; None: the cores there are. Changes no number.
+    progress : callable
+    """
+    from castblast.surrogate.fit_store import fit_key, load_fit
+
+    keys = [fit_key(spec, table) for spec in specs]
+    places = [folder / spec.name / _STORE for spec in specs]
+    fits = [load_fit(place, key) for place, key in zip(places, keys, strict=True)]
+    missing = [number for number, fit in enumerate(fits) if fit is None]
+    if min(len(missing), workers or available_cores()) <= 1:
+        for done, number in enumerate(missing):
+            part = part_of(progress, done, len(missing))
+            fits[number] = _fit_and_keep(specs[number], table, places[number], keys[number], part)
+    else:
+        jobs = [
+            Job(
+                f"fit {specs[n].name}",
+                _fit_elsewhere,
+                (
+                    specs[n],
+                    table.select(specs[n].features, specs[n].targets),
+                    places[n],
+                    keys[n],
+                ),
+            )
+            for n in missing
+        ]
+        run_jobs(jobs, workers, progress)
+        for number in missing:  # one that cannot be kept is made once more, here
+            fits[number] = load_fit(places[number], keys[number]) or _fit_and_keep(
+                specs[number], table, places[number], keys[number], silent
+            )
+    progress(1.0, f"{len(specs)} fits, {len(specs) - len(missing)} of them kept from earlier")
+    return [fit for fit in fits if fit is not None]
+
+
+def note_dataset(folder: Path, dataset: Path) -> None:
+    """Remember where the dataset of a folder of fits lies, seen from there."""
+    write_text(folder / _DATASET, Path(os.path.relpath(dataset, folder)).as_posix() + "\n")
+
+
+def kept_fits(folder: Path) -> tuple[Path, list[ModelSpec]]:
+    """Dataset and specs of a folder of fits.
+
+    Raises
+    ------
+    SpecError
+        There are none.
+    """
+    from castblast.surrogate.fit_store import kept_spec
+
+    note = folder / _DATASET
+    specs = [kept_spec(place) for place in sorted(folder.glob(f"*/{_STORE}"))]
+    found = [spec for spec in specs if spec is not None]
+    if not note.is_file() or not found:
+        message = f"{folder}: holds no fits of castblast train; give the dataset instead"
+        raise SpecError(message)
+    return folder / note.read_text(encoding="utf-8").strip(), found
+
+
+def part_of(progress: ProgressCallback, number: int, parts: int) -> ProgressCallback:
+    """Callback for part `number` of `parts`."""
+    return lambda share, line: progress((number + share) / parts, line)
+
+
+def _fit_and_keep(
+    spec: ModelSpec, table: Table, place: Path, key: dict[str, str], progress: ProgressCallback
+) -> Fit:
+    from castblast.surrogate.fit_store import save_fit
+    from castblast.surrogate.training import fit_spec
+
+    fit = fit_spec(spec, table, progress)
+    _write_files(place.parent, fit)
+    save_fit(place, spec, fit, key)
+    return fit
+
+
+def _fit_elsewhere(spec: ModelSpec, table: Table, place: Path, key: dict[str, str]) -> None:
+    """Fit in a process of its own: the result goes through the file."""
+    _fit_and_keep(spec, table, place, key, silent)
+
+
+def _write_files(folder: Path, fit: Fit) -> None:
+    """Network, scores, test rows and their picture."""
+    from castblast.export.json_file import to_json
+    from castblast.report.surrogate_figures import draw_parity
+
+    rows, table = fit.table.rows("test"), fit.table
+    columns: dict[str, Any] = {"sample": table.sample[rows]}
+    for j, name in enumerate(table.target_names):
+        columns[f"{name}_simulated"] = table.targets[rows, j]
+        columns[f"{name}_predicted"] = fit.predicted[rows, j]
+    write_json(folder / "fit.json", fit.to_document())
+    write_csv(folder / "test_rows.csv", columns)
+    draw_parity(folder / "parity.png", fit_title(fit), held_out(fit))
+    if fit.network is not None:
+        write_text(folder / "network.json", to_json(fit.network))
+    else:
+        (folder / "network.json").unlink(missing_ok=True)
+
+
+def fit_files(folder: Path) -> list[Path]:
+    """Files of a fit that mean the same elsewhere."""
+    return sorted(path for path in folder.iterdir() if path.is_file() and path.name != _STORE)
+
+
+def write_json(path: Path, document: dict[str, Any]) -> Path:
+    """Write plain JSON values."""
+    return write_text(path, json.dumps(document, indent=2, allow_nan=False) + "\n")
+
+
+def fit_title(fit: Fit) -> str:
+    """Name, description and rows of a fit in one line."""
+    what = f" ({fit.spec.description})" if fit.spec.description else ""
+    train, test = len(fit.table.rows("train")), len(fit.table.rows("test"))
+    return f"{fit.spec.name}{what}: {train:,} training rows, {test:,} test rows never trained on"
+
+
+def held_out(fit: Fit) -> HeldOutRows:
+    """Test rows of a fit as the pictures take them."""
+    from castblast.report.surrogate_figures import HeldOutRows
+
+    rows, table = fit.table.rows("test"), fit.table
+    document = fit.to_document()
+    return HeldOutRows(
+        truth={name: table.targets[rows, j] for j, name in enumerate(table.target_names)},
+        predicted={name: fit.predicted[rows, j] for j, name in enumerate(table.target_names)},
+        explosive=table.frame["explosive"].to_numpy(dtype=str)[rows],
+        scores=document["scores"]["test"],
+        by_explosive=document["test_by_explosive"],
+    )
