@@ -50,7 +50,7 @@ def export(
     Parameters
     ----------
     fit : path
-        Folder of `castblast train` (its chosen fit is taken), folder of one fit, or a network.json.
+        Folder of `castblast compare` (its chosen fit is taken), of one fit, or a network.json.
     out : path, optional
         Folder for the files; default ``export`` beside the fit.
     targets : sequence of str
@@ -101,15 +101,19 @@ def find_network(fit: Path) -> Path:
     comparison = fit / "comparison.json"
     if comparison.is_file():
         try:
-            chosen = str(json.loads(comparison.read_text(encoding="utf-8"))["chosen"])
+            chosen = json.loads(comparison.read_text(encoding="utf-8"))["chosen"]
         except (ValueError, KeyError, TypeError):
-            message = f"{comparison}: does not name a chosen model; train again"
+            message = f"{comparison}: does not name a chosen model; compare again"
             raise SpecError(message) from None
-        fit = fit / chosen
+        if chosen is None:
+            message = f"{comparison}: no model passed the physics gate, so none is chosen"
+            raise SpecError(message)
     if (fit / "network.json").is_file():
         return fit / "network.json"
-    what = "holds no network.json; give a folder of castblast train" if fit.is_dir() else "no such"
-    message = f"{fit}: {what}{'' if fit.is_dir() else ' file or folder'}"
+    what = "no such file or folder"
+    if fit.is_dir():
+        what = "holds no network.json; give a folder of castblast compare"
+    message = f"{fit}: {what}"
     raise SpecError(message)
 
 
