@@ -88,7 +88,7 @@ def test_atoms_are_numbered_as_they_are_fired_and_the_law_is_that_of_their_types
     assert f"group due id 1:{np.sum(~late)}\n" in words
     assert f"group due id {np.sum(~late) + 1}:240\n" in words
     assert words.count("velocity due set") == 2
-    assert "run 100\n" in words
+    assert "run 100 pre no" in words
     text = (tmp_path / "balls.data").read_text().split("Atoms\n")[1].split("Velocities")[0]
     atoms = np.loadtxt(text.strip().splitlines())
     np.testing.assert_array_equal(atoms[:, 4:7], case.particles.position[order])
@@ -188,12 +188,36 @@ def test_liggghts_throws_the_same_pile(tmp_path):
 
 
 @needs_liggghts
+def test_a_packed_block_that_is_fired_is_not_braked_by_the_deck(tmp_path):
+    """Balls that touch, half of them fired at 8 m/s past the others: energy to 1 per cent.
+
+    At the beginning of a run LIGGGHTS evaluates dashpots without the limit of slip. A deck that
+    begins anew at a firing loses 7 per cent here. This package has the limits of LIGGGHTS here, and
+    a step that is fine against the firing.
+    """
+    grid = np.stack(np.meshgrid(*[np.arange(6)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    place = 0.1 + 0.199 * grid
+    balls = particles_at_rest(place, np.full(216, 0.1), (grid[:, 1] < 3).astype(int))
+    case = CastCase(
+        balls, ContactLaw(), floor(), np.array([1.0, 0.002]), np.tile([8.0, 0.0, 0.0], (2, 1)),
+        max_time=0.03, sample_interval=1e-3,
+    )  # fmt: skip
+    write_liggghts_deck(tmp_path, case)
+    rows = re.findall(r"^ *\d+ +(\S+) +216 +(\S+) *$", run_liggghts(tmp_path), re.MULTILINE)
+    time, energy = np.array(rows, dtype=float).T
+    limits = ContactLaw(cap_on_total=True)
+    own = run_cast(case._replace(law=limits, time_step=2e-5)).history
+    for when in (0.006, 0.012, 0.024):
+        here = np.interp(when, own.time, own.translational_energy)
+        assert np.interp(when, time, energy) == pytest.approx(here, rel=0.01), when
+
+
+@needs_liggghts
 def test_loop_times_are_read_from_the_log(tmp_path):
     case = two_blocks()._replace(block_delay=NO_BLOCKS[0], block_velocity=NO_BLOCKS[1])
     balls = case.particles._replace(block=np.full(240, -1))
     write_liggghts_deck(tmp_path, case._replace(particles=balls), radius_bins=1, steps=50)
     run_liggghts(tmp_path)
-    first, last = read_loop_times(tmp_path / "log.liggghts")
+    (first,) = read_loop_times(tmp_path / "log.liggghts")
     assert first.seconds > 0.0
     assert (first.processes, first.steps, first.balls) == (1, 50, 240)
-    assert last.steps == 0

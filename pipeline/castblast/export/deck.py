@@ -18,6 +18,8 @@ from castblast.muckpile.particles import FloatArray, IntArray, Particles, ball_m
 #: LAMMPS has 32 groups; one per type, and a few others.
 MOST_TYPES = 24
 SKIN_RATIO = 0.15
+#: Goes on with the forces as they are.
+ON = "pre no post no"
 _LOOP = re.compile(r"^Loop time of (\S+) on (\d+) procs for (\d+) steps with (\d+) atoms", re.M)
 
 
@@ -175,13 +177,18 @@ def atom_lines(
 def firing_lines(
     case: CastCase, firings: Firings, step: float, members: Callable[[int], str]
 ) -> Iterator[str]:
-    """Lines that run up to each firing and fire it; `members` gives its balls as ``group`` does."""
+    """Lines that run up to each firing and fire it; `members` gives its balls as ``group`` does.
+
+    Forces are set up once: at each further beginning of a run LIGGGHTS would hold the dashpots of
+    slipping contacts against no limit, and brake a packed block that is fired by several per cent.
+    """
     yield "\n# Firing: balls of a block stand until it is fired, then move freely\n"
+    yield "run 0"
     before = 0
     for k, (time, velocity) in enumerate(zip(firings.time, firings.velocity, strict=True)):
         now = round(float(time) / step)
         if now > before:
-            yield f"run {now - before}"
+            yield f"run {now - before} {ON}"
             before = now
         vx, vy, vz = velocity
         yield f"group due {members(k + 1)}"
@@ -199,7 +206,7 @@ def sample_steps(case: CastCase, step: float) -> int:
 def ending_lines(case: CastCase, firings: Firings, step: float, steps: int) -> Iterator[str]:
     """Run `steps` steps if they are not 0; otherwise until the translational energy stays low."""
     if steps > 0:
-        yield f"run {steps}"
+        yield f"run {steps} {ON}"
         return
     piece = sample_steps(case, step)
     start = round(float(firings.time[-1]) / step) if len(firings.time) else 0
@@ -207,7 +214,7 @@ def ending_lines(case: CastCase, firings: Firings, step: float, steps: int) -> I
     earliest = ceil(case.min_time / step)
     yield "\n# Until the pile is at rest\n"
     yield "variable most equal 0.0\nvariable quiet equal 0"
-    yield f"label piece\nrun {piece}\nvariable now equal $(c_ke)"
+    yield f"label piece\nrun {piece} {ON}\nvariable now equal $(c_ke)"
     yield 'if "${now} > ${most}" then "variable most equal ${now}"'
     yield (
         f'if "$(v_now/(v_most+1e-300)) <= {case.stop_energy_ratio:.10g}" '
@@ -236,6 +243,6 @@ class LoopTime(NamedTuple):
 
 
 def read_loop_times(log: Path) -> list[LoopTime]:
-    """Read the times of all runs from the log of LAMMPS or LIGGGHTS."""
+    """Read the times of all runs of at least a step from the log of LAMMPS or LIGGGHTS."""
     found = _LOOP.findall(log.read_text(encoding="utf-8", errors="replace"))
-    return [LoopTime(float(s), int(p), int(n), int(b)) for s, p, n, b in found]
+    return [LoopTime(float(s), int(p), int(n), int(b)) for s, p, n, b in found if int(n)]
