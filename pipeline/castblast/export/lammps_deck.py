@@ -86,7 +86,7 @@ def deck_faults(case: CastCase) -> list[str]:
     if len(case.walls.corner):
         faults.append(
             f"{len(case.walls.corner)} facets: triangulated ground cannot be written; "
-            "use planes and slopes"
+            "use planes and slopes, or LIGGGHTS, which takes it"
         )
     return faults + wall_regions(case.walls)[1]
 

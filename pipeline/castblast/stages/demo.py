@@ -137,12 +137,14 @@ def _predict(demo: Demo, progress: ProgressCallback) -> list[str]:
 
 
 def _throw(demo: Demo, progress: ProgressCallback) -> list[str]:
+    from castblast.specs.bench import load_bench
     from castblast.stages.muckpile import run_muckpile
 
     folder = demo.out / "muckpile"
     answers = json.loads((demo.out / "prediction" / "comparison.json").read_text(encoding="utf-8"))
     velocity = f"{answers['predicted']['burden_velocity']:.6g} m/s"
-    key = make_key(bench=demo.bench, velocity=velocity)
+    named = {name: demo.bench.parent / name for name in load_bench(demo.bench).files()}
+    key = make_key(bench=demo.bench, velocity=velocity, **named)
     if not demo.restart and is_valid(folder, key):
         return [f"{folder}: still valid, reused"]
     outcome = run_muckpile(
