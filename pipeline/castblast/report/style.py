@@ -58,3 +58,17 @@ def save_figure(figure: Figure, path: Path, *, dpi: int = 150) -> Path:
     metadata = {"Date": None} if path.suffix == ".svg" else {"Software": None}
     with rc_context(_STYLE):
         return write_with(path, lambda name: figure.savefig(name, dpi=dpi, metadata=metadata))
+
+
+def words(name: str) -> str:
+    """Name of a variable as words."""
+    return name.replace("_", " ")
+
+
+def plain_log_ticks(axis: Any) -> None:
+    """Ticks of a logarithmic axis at 1, 2 and 5 of every decade, as plain numbers."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())

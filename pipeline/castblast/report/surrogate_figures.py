@@ -12,7 +12,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.report.style import BLUE, CYCLE, GREY, in_style, new_figure, save_figure
+from castblast.report.style import (
+    BLUE,
+    CYCLE,
+    GREY,
+    in_style,
+    new_figure,
+    plain_log_ticks,
+    save_figure,
+    words,
+)
 from castblast.variables import VARIABLES
 
 Floats = NDArray[np.float64]
@@ -115,25 +124,21 @@ def draw_parity(path: Path, title: str, rows: HeldOutRows) -> Path:
     return save_figure(figure, path)
 
 
-def _words(name: str) -> str:
-    return name.replace("_", " ")
-
-
 def _draw_learning(
     axis: Any, lines: Sequence[LearningLine], target: str, marks: Mapping[str, float]
 ) -> None:
     main = next(line for line in lines if line.target == target)
     others = [line for line in lines if line is not main]
     axis.loglog(main.rows, _percent(main.test), "o-", color=BLUE, linewidth=2.2, zorder=4,
-                label=_words(target))  # fmt: skip
+                label=words(target))  # fmt: skip
     axis.loglog(main.rows, _percent(main.train), ":", color=BLUE, linewidth=1.2, zorder=4,
-                label=f"{_words(target)}, training rows")  # fmt: skip
+                label=f"{words(target)}, training rows")  # fmt: skip
     for line, (marker, dash) in zip(others, _OTHER_TARGETS, strict=False):
         axis.loglog(line.rows, _percent(line.test), color=GREY, marker=marker, markersize=3.5,
-                    linestyle=dash, linewidth=1.0, label=_words(line.target))  # fmt: skip
+                    linestyle=dash, linewidth=1.0, label=words(line.target))  # fmt: skip
     mark = 100.0 * marks["relative_error_95"]
     axis.plot(marks["runs"], mark, "*", markersize=11, color="#222222", linestyle="none", zorder=5,
-              label=f"{_words(target)}, as published: {mark:g} %")  # fmt: skip
+              label=f"{words(target)}, as published: {mark:g} %")  # fmt: skip
     axis.set(
         title="a) Learning curve, test rows",
         xlabel="training rows",
@@ -143,7 +148,7 @@ def _draw_learning(
     apart = [a for a, b in pairwise(sizes) if b / a > 1.45] + [sizes[-1]]
     axis.set_xticks(apart, [f"{size:,}" for size in apart])
     axis.minorticks_off()
-    _plain_log_ticks(axis.yaxis)
+    plain_log_ticks(axis.yaxis)
     axis.legend(fontsize=7, loc="lower left", bbox_to_anchor=(0.0, 0.0))
     low, high = axis.get_ylim()
     axis.set_ylim(low / (high / low) ** 0.6, high)  # room for the legend
@@ -151,13 +156,6 @@ def _draw_learning(
 
 def _percent(fractions: Sequence[float]) -> Floats:
     return 100.0 * np.asarray(fractions, dtype=np.float64)
-
-
-def _plain_log_ticks(axis: Any) -> None:
-    from matplotlib.ticker import FuncFormatter, LogLocator
-
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
 def _draw_histogram(axis: Any, rows: HeldOutRows, target: str, marks: Mapping[str, float]) -> None:
@@ -175,7 +173,7 @@ def _draw_histogram(axis: Any, rows: HeldOutRows, target: str, marks: Mapping[st
         transform=axis.transAxes, ha="right", va="top", fontsize=8, bbox=_PLATE,
     )  # fmt: skip
     axis.set(
-        title=f"b) Error of {_words(target)}, test rows",
+        title=f"b) Error of {words(target)}, test rows",
         xlabel="relative error [%]; what lies beyond is in the outer bins",
         ylabel="rows",
     )
@@ -191,14 +189,14 @@ def _draw_parity(axis: Any, rows: HeldOutRows, target: str, letter: str = "") ->
     for kind, colour in zip(np.unique(rows.explosive), CYCLE, strict=False):
         own = rows.explosive == kind
         axis.scatter(truth[own], predicted[own], s=5, linewidths=0, alpha=0.6, color=colour,
-                     label=_words(str(kind)), rasterized=True)  # fmt: skip
+                     label=words(str(kind)), rasterized=True)  # fmt: skip
     r2, error = (rows.scores[target][name] for name in ("r2", "relative_error_95"))
     axis.text(
         0.98, 0.04, f"R² {floor(r2 * 1e5) / 1e5:.5f}\n95 % within {error:.2%}",
         transform=axis.transAxes, ha="right", va="bottom", fontsize=8,
     )  # fmt: skip
     axis.set(
-        title=f"{letter}{_words(target)[0].upper()}{_words(target)[1:]}",
+        title=f"{letter}{words(target)[0].upper()}{words(target)[1:]}",
         xlabel=f"simulated [{variable.shown_unit}]",
         ylabel=f"predicted [{variable.shown_unit}]",
         aspect="equal",
@@ -214,7 +212,7 @@ def _draw_by_explosive(axis: Any, rows: HeldOutRows, marks: Mapping[str, float])
         places = np.arange(len(targets)) + (k - (len(kinds) - 1) / 2) * height
         axis.barh(places, values, height=0.9 * height, color=colour)
     axis.axvline(100.0 * marks["relative_error_95"], **_MARK)
-    axis.set_yticks(range(len(targets)), [_words(t).replace(" ", "\n", 1) for t in targets])
+    axis.set_yticks(range(len(targets)), [words(t).replace(" ", "\n", 1) for t in targets])
     axis.invert_yaxis()
     axis.grid(visible=False, axis="y")
     axis.set(

@@ -119,6 +119,7 @@ def learning_report(points: Sequence[LearningPoint], marks: Mapping[str, float])
     dict
         Plain JSON values, target -> ``rows``, ``error``, ``law`` (floor, scale, exponent, scatter
         and 95 % intervals; None if there is none), ``trusted`` (bool) and ``why_not``, ``mark``,
+        ``band`` (rows, lower, upper of the law, to draw; None without one),
         ``reached_at`` (fewest rows from which on all points meet it, or None), ``runs_for_mark``
         and ``runs_for_mark_interval`` (training rows; None where nothing is promised), ``stop``
         (bool) and ``advice``, a sentence.
@@ -144,6 +145,7 @@ def _target_report(points: Sequence[LearningPoint], target: str, mark: float) ->
         "trusted": not why_not,
         "why_not": why_not,
         "mark": mark,
+        "band": None if law is None else _band(law, min(rows)),
         "reached_at": reached,
         "runs_for_mark": needed,
         "runs_for_mark_interval": interval,
@@ -209,6 +211,12 @@ def _advise(
         f"{name}: {mark:.2%} is more than {REACH:g} times the {most:,.0f} rows tried away; twice "
         f"the rows would lower the error by {gain:.0%}"
     )
+
+
+def _band(law: PowerLaw, fewest: float) -> dict[str, list[float]]:
+    rows = np.geomspace(fewest, REACH * law.most_rows, 40)
+    low, high = law.interval(rows)
+    return {"rows": rows.tolist(), "lower": low.tolist(), "upper": high.tolist()}
 
 
 def _document(law: PowerLaw) -> dict[str, Any]:

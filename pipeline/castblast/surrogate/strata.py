@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,28 +16,6 @@ from castblast.surrogate.metrics import (
     score_targets,
 )
 from castblast.surrogate.training import Fit
-
-
-class ErrorMap(NamedTuple):
-    """Error over the plane of two inputs.
-
-    Attributes
-    ----------
-    target, across, up : str
-        Target, and the inputs along the two axes.
-    across_edges, up_edges : (k + 1,) [SI]
-    error : (k, k)
-        95 % relative error of the rows in a cell, first axis `across`; NaN in a cell of too few.
-    rows : (k, k) int64
-    """
-
-    target: str
-    across: str
-    up: str
-    across_edges: Floats
-    up_edges: Floats
-    error: Floats
-    rows: NDArray[np.int64]
 
 
 def strata(fit: Fit, split: Split = "test", bins: int = 10) -> dict[str, Any]:
@@ -128,7 +106,7 @@ def worst_cases(fit: Fit, count: int = 10, split: Split = "test") -> list[dict[s
 
 def error_maps(
     fit: Fit, target: str = "burden_velocity", split: Split = "test", bins: int = 6, pairs: int = 6
-) -> list[ErrorMap]:
+) -> list[dict[str, Any]]:
     """Error over the planes of inputs where it differs most from cell to cell.
 
     Parameters
@@ -137,6 +115,13 @@ def error_maps(
         Cells along each input, of equal count of rows in one dimension.
     pairs : int
         Planes; the inputs are those whose bins differ most, see `strata`.
+
+    Returns
+    -------
+    list of dict
+        Plain JSON values: target, across and up (inputs), across_edges and up_edges [SI], error
+        (k x k, first axis across; 95 % relative error of the rows in a cell, None where they are
+        too few) and rows (k x k).
     """
     document = strata(fit, split, bins)
     spread = document["spread"][target]
@@ -145,7 +130,9 @@ def error_maps(
     return [_error_map(fit, target, split, bins, *plane) for plane in planes]
 
 
-def _error_map(fit: Fit, target: str, split: Split, bins: int, across: str, up: str) -> ErrorMap:
+def _error_map(
+    fit: Fit, target: str, split: Split, bins: int, across: str, up: str
+) -> dict[str, Any]:
     rows, table = fit.table.rows(split), fit.table
     j = table.target_names.index(target)
     errors = np.abs(relative_errors(table.targets[rows, j], fit.predicted[rows, j]))
@@ -162,7 +149,15 @@ def _error_map(fit: Fit, target: str, split: Split, bins: int, across: str, up: 
             counts[a, b] = np.count_nonzero(own)
             if counts[a, b] >= 5:  # of fewer rows a 95 % figure says nothing
                 error[a, b] = np.quantile(errors[own], LEVEL, method="inverted_cdf")
-    return ErrorMap(target, across, up, edges[0], edges[1], error, counts)
+    return {
+        "target": target,
+        "across": across,
+        "up": up,
+        "across_edges": edges[0].tolist(),
+        "up_edges": edges[1].tolist(),
+        "error": [[_json(value) for value in line] for line in error],
+        "rows": counts.tolist(),
+    }
 
 
 def _edges(values: Floats, bins: int) -> Floats:
