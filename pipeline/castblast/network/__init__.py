@@ -22,6 +22,7 @@ from castblast.network.evaluate import (
     explosive_index,
     member_spread,
     predict_rows,
+    run_layers,
     scaled_inputs,
 )
 from castblast.network.record import (
@@ -65,6 +66,7 @@ __all__ = [
     "in_domain",
     "member_spread",
     "predict_rows",
+    "run_layers",
     "scale_columns",
     "scaled_inputs",
 ]

@@ -102,11 +102,18 @@ def evaluate_rows(network: Network, numeric: Floats, index: NDArray[np.int64]) -
     return _run(network, network.layers, scaled_inputs(network, numeric, index))
 
 
-def _run(network: Network, layers: Sequence[Layer], x: Floats) -> Floats:
-    """Scaled rows through a chain of layers to outputs in SI."""
+def run_layers(layers: Sequence[Layer], x: Floats) -> Floats:
+    """Rows (n, k) that are scaled already through a chain of layers."""
     with np.errstate(invalid="ignore", over="ignore"):
         for layer in layers:
             x = _ACTIVATIONS[layer.activation](x @ layer.weights + layer.biases)
+    return x
+
+
+def _run(network: Network, layers: Sequence[Layer], x: Floats) -> Floats:
+    """Scaled rows through a chain of layers to outputs in SI."""
+    x = run_layers(layers, x)
+    with np.errstate(invalid="ignore", over="ignore"):
         x = x * np.array([c.scale for c in network.outputs])
         x = x + np.array([c.mean for c in network.outputs])
         logged = np.array([column.transform == "log" for column in network.outputs])

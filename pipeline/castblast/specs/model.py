@@ -7,137 +7,60 @@ of a candidate is the name of its file.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, TypeAlias
-
-from pydantic import Field, field_validator, model_validator
+from typing import Any, TypeAlias, get_args
 
 from castblast.errors import SpecError, nearest_name
-from castblast.network import Transform
-from castblast.specs.loading import Spec, make_spec, read_yaml
-from castblast.variables import INPUT_NAMES, OUTPUT_NAMES
-
-#: The seven features of the published network are these six and the explosive.
-PAPER_FEATURES = (
-    "young_modulus",
-    "ucs",
-    "hole_diameter",
-    "bench_height",
-    "burden",
-    "charge_length",
+from castblast.specs.loading import make_spec, read_yaml
+from castblast.specs.model_base import (
+    ALL_FEATURES,
+    PAPER_FEATURES,
+    PAPER_TARGETS,
+    DerivedSpec,
+    RandomStarts,
+    SurrogateSpec,
 )
-#: The three published targets and the expanded hole radius.
-PAPER_TARGETS = (
-    "equilibrium_pressure",
-    "burden_velocity",
-    "crushed_zone_radius",
-    "expanded_hole_radius",
+from castblast.specs.model_families import (
+    CustomSpec,
+    GaussianProcessSpec,
+    GradientBoostingSpec,
+    LevenbergSpec,
+    MlpSpec,
+    RidgeSpec,
+    TorchSpec,
 )
 
+__all__ = [
+    "ALL_FEATURES",
+    "PAPER_FEATURES",
+    "PAPER_TARGETS",
+    "CustomSpec",
+    "DerivedSpec",
+    "GaussianProcessSpec",
+    "GradientBoostingSpec",
+    "LevenbergSpec",
+    "MlpSpec",
+    "ModelSpec",
+    "RandomStarts",
+    "RidgeSpec",
+    "SurrogateSpec",
+    "TorchSpec",
+    "read_model_spec",
+    "read_model_specs",
+]
 
-class SurrogateSpec(Spec):
-    """What every family has in common.
-
-    Attributes
-    ----------
-    name : str
-        Name of the candidate; the stem of its file unless given.
-    description : str
-        One line for tables.
-    features : tuple of str
-        Numeric inputs; the explosive always enters as well, one-hot.
-    targets : tuple of str
-    input_transform, target_transform : {"linear", "log"}
-        Applied to every numeric input or every target before standard scaling. With "log" the
-        squared error that is minimised is one of relative deviations.
-    """
-
-    name: str = Field(min_length=1, pattern=r"^[a-z0-9_]+$")
-    description: str = ""
-    features: tuple[str, ...] = Field(PAPER_FEATURES, min_length=1)
-    targets: tuple[str, ...] = Field(PAPER_TARGETS, min_length=1)
-    input_transform: Transform = "linear"
-    target_transform: Transform = "linear"
-
-    @field_validator("features", "targets")
-    @classmethod
-    def _distinct(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        twice = sorted({name for name in names if names.count(name) > 1})
-        if twice:
-            message = f"given twice: {', '.join(twice)}"
-            raise ValueError(message)
-        return names
-
-    @model_validator(mode="after")
-    def _known_names(self) -> Self:
-        faults = []
-        for field, names, allowed in (
-            ("features", self.features, INPUT_NAMES),
-            ("targets", self.targets, OUTPUT_NAMES),
-        ):
-            faults += [
-                f"{field}: unknown variable '{name}'{nearest_name(name, allowed)}"
-                for name in names
-                if name not in allowed
-            ]
-        if faults:
-            raise ValueError("; ".join(faults))
-        return self
-
-
-class MlpSpec(SurrogateSpec):
-    """Fully connected network of scikit-learn, full-batch L-BFGS.
-
-    Attributes
-    ----------
-    hidden_layers : tuple of int
-        Nodes of each hidden layer.
-    activation : {"tanh", "relu", "logistic"}
-        Of every hidden layer; the last layer is linear.
-    penalty : float
-        L2 penalty on the weights (``alpha`` of scikit-learn).
-    max_iterations : int
-        Bound on L-BFGS iterations of each round; reaching it is recorded, not an error.
-    tolerance : float
-        Change of loss or gradient at which L-BFGS stops.
-    refinements : int
-        Further rounds from the weights found, in each of which the solver sees the scaled targets
-        ten times larger. L-BFGS as scikit-learn calls it also stops when the loss falls by less
-        than 2.2e-9, an absolute bound that ends the first round early.
-    restarts : int
-        Fits from different random weights; the best on the validation rows is kept.
-    seed : int
-        Random weights of restart i come from ``seed + i``.
-    """
-
-    kind: Literal["mlp"] = "mlp"
-    hidden_layers: tuple[Annotated[int, Field(ge=1, le=4096)], ...] = Field((7, 7, 7), min_length=1)
-    activation: Literal["tanh", "relu", "logistic"] = "tanh"
-    penalty: float = Field(0.0, ge=0.0)
-    max_iterations: int = Field(5000, ge=1)
-    tolerance: float = Field(1e-7, gt=0.0)
-    refinements: int = Field(0, ge=0, le=4)
-    restarts: int = Field(1, ge=1, le=100)
-    seed: int = Field(0, ge=0, lt=2**31)
-
-
-class RidgeSpec(SurrogateSpec):
-    """Linear regression with an L2 penalty on polynomials of the scaled inputs: the floor.
-
-    Attributes
-    ----------
-    degree : int
-        Degree of the polynomial; only degree 1 can be exported, as a network of one layer.
-    penalty : float
-        ``alpha`` of scikit-learn.
-    """
-
-    kind: Literal["ridge"] = "ridge"
-    degree: int = Field(1, ge=1, le=6)
-    penalty: float = Field(1e-6, ge=0.0)
-
-
-ModelSpec: TypeAlias = MlpSpec | RidgeSpec
-_KINDS: dict[str, type[MlpSpec] | type[RidgeSpec]] = {"mlp": MlpSpec, "ridge": RidgeSpec}
+ModelSpec: TypeAlias = (
+    MlpSpec
+    | LevenbergSpec
+    | TorchSpec
+    | GradientBoostingSpec
+    | GaussianProcessSpec
+    | RidgeSpec
+    | CustomSpec
+)
+_FAMILIES: tuple[type[ModelSpec], ...] = get_args(ModelSpec)
+_KINDS: dict[str, type[ModelSpec]] = {
+    family.model_fields["kind"].default: family for family in _FAMILIES
+}
 
 
 def read_model_spec(path: Path) -> ModelSpec:

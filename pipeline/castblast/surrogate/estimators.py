@@ -1,31 +1,30 @@
 """Spec to scikit-learn estimator, and fitted estimator to `Network`.
 
-The estimator is stock scikit-learn from end to end, scaling of targets included, so that it can
-be stored, tracked and compared by the usual tools. It takes a data frame with the numeric features
-in SI and the column ``explosive``, and gives the targets in SI.
+The estimator is made of scikit-learn steps from end to end, scaling of targets included, so that
+it can be stored, tracked and compared by the usual tools. It takes a data frame with the numeric
+features in SI and the column ``explosive``, and gives the targets in SI.
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import product
 from typing import Any
 
 import numpy as np
 
 from castblast.network import (
-    Activation,
     Column,
+    DerivedColumn,
     Floats,
     GoldenRows,
     InputColumn,
-    Layer,
     Network,
     OutputColumn,
-    Transform,
 )
 from castblast.specs.model import MlpSpec, ModelSpec
+from castblast.surrogate.families import make_model
 from castblast.surrogate.features import Table, domain_constraints, input_columns
 from castblast.variables import VARIABLES
 
@@ -33,73 +32,42 @@ _GOLDEN_ROWS = 200
 _GOLDEN_CORNERS = 64
 
 
-def make_estimator(spec: ModelSpec, explosives: Sequence[str], seed: int) -> Any:
+def make_estimator(spec: ModelSpec, table: Table, seed: int) -> Any:
     """Make the unfitted estimator of a spec.
 
     Parameters
     ----------
     spec : ModelSpec
-    explosives : sequence of str
-        Categories of the one-hot column, in order.
+        With named features.
+    table : Table
+        Gives the explosives, in order, and their descriptors.
     seed : int
         Of the random starting weights; families without any ignore it.
 
     Returns
     -------
     sklearn.compose.TransformedTargetRegressor
+        Of a pipeline with the steps ``columns`` and ``model``.
     """
-    from sklearn.compose import ColumnTransformer, TransformedTargetRegressor
+    from sklearn.compose import TransformedTargetRegressor
     from sklearn.pipeline import Pipeline
-    from sklearn.preprocessing import OneHotEncoder, PolynomialFeatures
 
-    one_hot = OneHotEncoder(categories=[list(explosives)], sparse_output=False)
-    columns = ColumnTransformer(
-        [
-            ("numeric", _scaler(spec.input_transform), list(spec.features)),
-            ("explosive", one_hot, ["explosive"]),
-        ]
-    )
-    steps: list[tuple[str, Any]] = [("columns", columns)]
-    if not isinstance(spec, MlpSpec) and spec.degree > 1:
-        steps.append(("polynomial", PolynomialFeatures(degree=spec.degree, include_bias=False)))
-    steps.append(("model", _model(spec, seed)))
+    from castblast.surrogate.columns import make_columns, make_scaler
+
+    steps = [("columns", make_columns(spec, table)), ("model", make_model(spec, table, seed))]
+    scaler = make_scaler([spec.target_transform] * len(spec.targets))
     return TransformedTargetRegressor(
-        regressor=Pipeline(steps), transformer=_scaler(spec.target_transform), check_inverse=False
+        regressor=Pipeline(steps), transformer=scaler, check_inverse=False
     )
 
 
-def _scaler(transform: Transform) -> Any:
-    """Standard scaling, of logarithms if so asked; always a pipeline that ends in the scaler."""
-    from sklearn.pipeline import Pipeline
-    from sklearn.preprocessing import FunctionTransformer, StandardScaler
-
-    log = FunctionTransformer(
-        func=np.log, inverse_func=np.exp, check_inverse=False, feature_names_out="one-to-one"
-    )
-    steps = [("log", log)] if transform == "log" else []
-    return Pipeline([*steps, ("scale", StandardScaler())])
-
-
-def _model(spec: ModelSpec, seed: int) -> Any:
-    if isinstance(spec, MlpSpec):
-        from sklearn.neural_network import MLPRegressor
-
-        return MLPRegressor(
-            hidden_layer_sizes=spec.hidden_layers,
-            activation=spec.activation,
-            solver="lbfgs",
-            alpha=spec.penalty,
-            max_iter=spec.max_iterations,
-            max_fun=10**6,
-            tol=spec.tolerance,
-            random_state=seed,
-        )
-    from sklearn.linear_model import Ridge
-
-    return Ridge(alpha=spec.penalty)
-
-
-def fit_estimator(estimator: Any, spec: ModelSpec, frame: Any, targets: Floats) -> tuple[int, bool]:
+def fit_estimator(
+    estimator: Any,
+    spec: ModelSpec,
+    frame: Any,
+    targets: Floats,
+    watch: Callable[[Any], None] | None = None,
+) -> tuple[int, bool]:
     """Fit in place on one BLAS thread: with such small matrices a second one slows the fit down.
 
     Parameters
@@ -110,6 +78,9 @@ def fit_estimator(estimator: Any, spec: ModelSpec, frame: Any, targets: Floats) 
     frame : pandas.DataFrame
         Numeric features [SI] and ``explosive``.
     targets : (n, m) [SI]
+    watch : callable, optional
+        Called now and then by families that can, with an estimator as far as it is fitted. What
+        it raises ends the fit.
 
     Returns
     -------
@@ -123,16 +94,52 @@ def fit_estimator(estimator: Any, spec: ModelSpec, frame: Any, targets: Floats) 
 
     with warnings.catch_warnings(record=True) as caught, threadpool_limits(1):
         warnings.simplefilter("always")
-        estimator.fit(frame, targets)
+        if watch is not None and "watch" in estimator.regressor["model"].get_params():
+            watcher = _model_watch(estimator, frame, targets, watch)
+            estimator.regressor.set_params(model__watch=watcher)
+        try:
+            estimator.fit(frame, targets)
+        finally:
+            _unwatch(estimator)
         model = estimator.regressor_["model"]
-        total = int(getattr(model, "n_iter_", 0) or 0)
+        total = int(np.max(getattr(model, "n_iter_", 0) or 0))
         if isinstance(spec, MlpSpec) and spec.refinements:
             features = estimator.regressor_["columns"].transform(frame)
             scaled = estimator.transformer_.transform(targets)
             for round_ in range(1, spec.refinements + 1):
                 caught.clear()
                 total += _refine(model, features, scaled, 10.0**round_)
-    return total, not any(issubclass(entry.category, ConvergenceWarning) for entry in caught)
+    warned = any(issubclass(entry.category, ConvergenceWarning) for entry in caught)
+    return total, bool(getattr(model, "converged_", not warned))
+
+
+def _model_watch(
+    estimator: Any, frame: Any, targets: Floats, watch: Callable[[Any], None]
+) -> Callable[[Callable[[Floats], Floats]], None]:
+    """Turn a watch of whole estimators into one of what stands inside the scalings."""
+    from sklearn.base import clone
+
+    columns = clone(estimator.regressor["columns"]).fit(frame)
+    scaler = clone(estimator.transformer).fit(targets)
+
+    class Partial:
+        """The estimator as far as its model is fitted."""
+
+        def __init__(self, inner: Callable[[Floats], Floats]) -> None:
+            self.inner = inner
+
+        def predict(self, rows: Any) -> Floats:
+            values: Floats = scaler.inverse_transform(self.inner(columns.transform(rows)))
+            return values
+
+    return lambda inner: watch(Partial(inner))
+
+
+def _unwatch(estimator: Any) -> None:
+    """Forget the watch: a fitted estimator holds nothing that cannot be stored."""
+    for pipeline in (estimator.regressor, getattr(estimator, "regressor_", None)):
+        if pipeline is not None and "watch" in pipeline["model"].get_params():
+            pipeline.set_params(model__watch=None)
 
 
 def _refine(model: Any, features: Floats, scaled: Floats, spread: float) -> int:
@@ -159,14 +166,9 @@ def predict(estimator: Any, frame: Any) -> Floats:
     return values.reshape(len(frame), -1)
 
 
-def is_exportable(spec: ModelSpec) -> bool:
-    """Whether the family of this spec is a chain of dense layers."""
-    return isinstance(spec, MlpSpec) or spec.degree == 1
-
-
 def to_network(
     estimator: Any, spec: ModelSpec, table: Table, band: Floats, provenance: Mapping[str, Any]
-) -> Network:
+) -> Network | None:
     """Turn a fitted estimator into the neutral record.
 
     Parameters
@@ -174,16 +176,29 @@ def to_network(
     estimator
         Fitted on the training rows of `table`.
     spec : ModelSpec
-        Exportable.
     table : Table
         With the features and targets of `spec`.
     band : (m,)
         Relative 95 % band of each target.
     provenance : mapping
         Plain JSON values.
+
+    Returns
+    -------
+    Network or None
+        None for a model that is no chain of dense layers.
     """
-    numeric = estimator.regressor_["columns"].named_transformers_["numeric"]["scale"]
-    inputs = input_columns(table, spec.input_transform, numeric.mean_, numeric.scale_)
+    from castblast.surrogate.columns import derived_columns, explosive_codes
+    from castblast.surrogate.dense_models import layers_of
+
+    layers = layers_of(estimator.regressor_["model"])
+    if layers is None:
+        return None
+    columns = estimator.regressor_["columns"]
+    numeric = columns.named_transformers_["numeric"]["scale"]
+    transforms = [spec.transform_of(name) for name in spec.features]
+    inputs = input_columns(table, transforms, numeric.mean_, numeric.scale_)
+    derived = derived_columns(spec, columns)
     targets = estimator.transformer_["scale"]
     outputs = tuple(
         OutputColumn(
@@ -199,46 +214,58 @@ def to_network(
     return Network(
         inputs=inputs,
         explosives=table.explosives,
-        codes=np.eye(len(table.explosives)),
-        layers=_layers(estimator.regressor_["model"]),
+        codes=explosive_codes(columns, table.explosives),
+        layers=layers,
         outputs=outputs,
         constraints=domain_constraints(table),
-        golden=golden_rows(estimator, inputs, table.explosives),
+        golden=golden_rows(estimator, inputs, table.explosives, derived),
         provenance=provenance,
+        derived=derived,
     )
 
 
-def _layers(model: Any) -> tuple[Layer, ...]:
-    if hasattr(model, "coefs_"):
-        last = len(model.coefs_) - 1
-        activation: Activation = model.activation
-        return tuple(
-            Layer(weights, biases, "identity" if number == last else activation)
-            for number, (weights, biases) in enumerate(
-                zip(model.coefs_, model.intercepts_, strict=True)
-            )
-        )
-    weights = np.ascontiguousarray(np.atleast_2d(model.coef_).T)
-    return (Layer(weights, np.atleast_1d(model.intercept_), "identity"),)
-
-
 def golden_rows(
-    estimator: Any, inputs: Sequence[InputColumn], explosives: Sequence[str], seed: int = 0
+    estimator: Any,
+    inputs: Sequence[InputColumn],
+    explosives: Sequence[str],
+    derived: Sequence[DerivedColumn] = (),
+    seed: int = 0,
 ) -> GoldenRows:
-    """Answers of the estimator on corners of the training box and on rows inside it."""
+    """Answers of the estimator on corners of the training box and on rows inside it.
+
+    Rows for which a derived column cannot be logged, such as a charge of less than no length, are
+    left out.
+    """
     import pandas as pd
 
     rng = np.random.default_rng(seed)
     lower = np.array([column.lower for column in inputs])
     upper = np.array([column.upper for column in inputs])
-    corners = _corners(len(inputs), rng)
-    inside = rng.random((_GOLDEN_ROWS - len(corners), len(inputs)))
-    # lower + (upper - lower) may miss `upper` by a bit; the corner itself must be in the box.
-    shares = np.concatenate([corners, inside])
-    rows = np.where(shares == 1.0, upper, lower + (upper - lower) * shares)
+    shares = _corners(len(inputs), rng)
+    rows = np.empty((0, len(inputs)))
+    while len(rows) < _GOLDEN_ROWS:
+        # lower + (upper - lower) may miss `upper` by a bit; the corner itself must be in the box.
+        drawn = np.where(shares == 1.0, upper, lower + (upper - lower) * shares)
+        rows = np.concatenate([rows, drawn[_can_be_logged(drawn, inputs, derived)]])
+        shares = rng.random((_GOLDEN_ROWS - len(rows), len(inputs)))
     kinds = [explosives[k] for k in rng.integers(0, len(explosives), len(rows))]
     frame = pd.DataFrame(rows, columns=_names(inputs)).assign(explosive=kinds)
     return GoldenRows(rows, tuple(kinds), predict(estimator, frame))
+
+
+def _can_be_logged(
+    rows: Floats, inputs: Sequence[InputColumn], derived: Sequence[DerivedColumn]
+) -> Any:
+    good = np.ones(len(rows), dtype=bool)
+    for column in derived:
+        if column.transform == "log":
+            names = _names(inputs)
+            value = sum(c * rows[:, names.index(n)] for n, c in column.coefficients.items())
+            # Not by a hair either: there rounding is all that is left of a difference.
+            good &= value > 1e-6 * np.max(
+                np.abs(rows[:, [names.index(n) for n in column.coefficients]]), axis=1
+            )
+    return good
 
 
 def _names(columns: Sequence[Column]) -> list[str]:

@@ -8,7 +8,7 @@ error band only, test for the published scores only.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from castblast.dataset.schema import flag_names
 from castblast.errors import DatasetError, nearest_name
 from castblast.network import Constraint, Floats, InputColumn, Transform
+from castblast.specs.model import ALL_FEATURES
 from castblast.variables import INPUT_NAMES, VARIABLES
 
 if TYPE_CHECKING:
@@ -38,6 +39,16 @@ _RATIOS: tuple[tuple[str, dict[str, float], str, bool], ...] = (
     ),
     ("charge length", {"charge_length": 1.0}, "bench_height", True),
     ("charge length", {"charge_length": 1.0}, "hole_diameter", False),
+    ("stemming length", {"stemming_length": 1.0}, "burden", True),
+    ("stemming length", {"stemming_length": 1.0}, "bench_height", True),
+    (
+        "bench height less stemming length",
+        {"bench_height": 1.0, "stemming_length": -1.0},
+        "hole_diameter",
+        False,
+    ),
+    ("spacing", {"spacing": 1.0}, "burden", True),
+    ("tensile strength", {"tensile_strength": 1.0}, "ucs", True),
 )
 _PROVENANCE = ("name", "dataset_version", "content_sha256", "recipe_sha256")
 
@@ -62,6 +73,10 @@ class Table:
         Name, version and hashes of the dataset.
     held : mapping of input name to float [SI]
         Inputs that the dataset holds at one value.
+    varying : tuple of str
+        Inputs that the design of the dataset varies: what the feature name ``all`` stands for.
+    descriptors : mapping of explosive to mapping of name to float [SI]
+        What the dataset says about each explosive in numbers.
     """
 
     frame: pd.DataFrame
@@ -72,6 +87,8 @@ class Table:
     split: NDArray[np.str_]
     source: Mapping[str, str]
     held: Mapping[str, float]
+    varying: tuple[str, ...] = ()
+    descriptors: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     @property
     def feature_names(self) -> tuple[str, ...]:
@@ -84,6 +101,7 @@ class Table:
 
     def select(self, features: Sequence[str], targets: Sequence[str]) -> Table:
         """Give the same rows with some of the features and targets, in the given order."""
+        features = expand(features, self.varying)
         positions = [self.target_names.index(name) for name in targets]
         return replace(
             self,
@@ -109,12 +127,21 @@ class Table:
 def read_table(dataset: xr.Dataset, features: Sequence[str], targets: Sequence[str]) -> Table:
     """Read what training needs from a dataset.
 
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+    features : sequence of str
+        Numeric inputs; ``all`` stands for every one that the dataset varies.
+    targets : sequence of str
+
     Raises
     ------
     DatasetError
         Missing columns (with the nearest name), numbers that are not finite, too few rows of a
         split, an explosive without training rows; all faults at once.
     """
+    varying = varying_inputs(dataset)
+    features = expand(features, varying)
     faults = [
         f"{name}: the dataset has no such variable{nearest_name(name, map(str, dataset.data_vars))}"
         for name in (*features, *targets, "explosive", "split", "status")
@@ -137,12 +164,46 @@ def read_table(dataset: xr.Dataset, features: Sequence[str], targets: Sequence[s
         sample=dataset["sample"].to_numpy()[ok].astype(np.int64),
         split=_labels(dataset["split"])[ok],
         held=_held(dataset, features),
+        varying=varying,
+        descriptors=_descriptors(dataset),
         source={key: str(dataset.attrs[key]) for key in _PROVENANCE if key in dataset.attrs},
     )
     faults = _faults(table, dropped=dataset.sizes["sample"] - len(ok))
     if faults:
         raise DatasetError("\n".join(faults))
     return table
+
+
+def expand(features: Sequence[str], varying: Sequence[str]) -> tuple[str, ...]:
+    """Feature names with ``all`` replaced by the varying inputs, each name once."""
+    names = [n for name in features for n in (varying if (name,) == ALL_FEATURES else (name,))]
+    return tuple(dict.fromkeys(names))
+
+
+def varying_inputs(dataset: xr.Dataset) -> tuple[str, ...]:
+    """Inputs that the design of a dataset varies, those derived from others left out."""
+    return tuple(
+        name
+        for name in INPUT_NAMES
+        if name in dataset.data_vars
+        and dataset[name].attrs.get("role", "input") == "input"
+        and float(np.ptp(dataset[name].to_numpy())) > 0.0
+    )
+
+
+def _descriptors(dataset: xr.Dataset) -> dict[str, dict[str, float]]:
+    """Numbers per explosive, by its name; none in datasets without them."""
+    if "explosive_name" not in dataset.variables:
+        return {}
+    numbers = {
+        str(name).removeprefix("explosive_"): values.to_numpy()
+        for name, values in dataset.data_vars.items()
+        if values.attrs.get("role") == "descriptor"
+    }
+    return {
+        str(name): {key: float(values[k]) for key, values in numbers.items()}
+        for k, name in enumerate(dataset["explosive_name"].to_numpy())
+    }
 
 
 def _held(dataset: xr.Dataset, features: Sequence[str]) -> dict[str, float]:
@@ -199,24 +260,38 @@ def _faults(table: Table, dropped: int) -> list[str]:
     return faults
 
 
-def check_positive(table: Table, names: Sequence[str]) -> None:
+def check_positive(
+    table: Table, names: Sequence[str], derived: Mapping[str, Mapping[str, float]] | None = None
+) -> None:
     """Refuse columns that are to be logged but hold values of 0 or below.
+
+    Parameters
+    ----------
+    table : Table
+    names : sequence of str
+        Features and targets.
+    derived : mapping of name to coefficients of inputs, optional
+        Sums of features.
 
     Raises
     ------
     DatasetError
         One line per column.
     """
+    columns = {
+        name: table.targets[:, table.target_names.index(name)]
+        if name in table.target_names
+        else table.frame[name].to_numpy()
+        for name in names
+    }
+    for name, coefficients in (derived or {}).items():
+        columns[name] = np.sum([c * table.frame[n] for n, c in coefficients.items()], axis=0)
     faults = []
-    for name in names:
-        values = (
-            table.targets[:, table.target_names.index(name)]
-            if name in table.target_names
-            else table.frame[name].to_numpy()
-        )
+    for name, values in columns.items():
         bad = np.flatnonzero(values <= 0.0)
         if len(bad):
-            shown = VARIABLES[name].show(float(values[bad[0]]))
+            value = float(values[bad[0]])
+            shown = VARIABLES[name].show(value) if name in VARIABLES else f"{value:.6g}"
             faults.append(
                 f"{name}: {len(bad)} rows are not above 0 (sample {table.sample[bad[0]]}: "
                 f"{shown}); a model with transform 'log' cannot use it"
@@ -226,7 +301,7 @@ def check_positive(table: Table, names: Sequence[str]) -> None:
 
 
 def input_columns(
-    table: Table, transform: Transform, mean: Floats, scale: Floats
+    table: Table, transforms: Sequence[Transform], mean: Floats, scale: Floats
 ) -> tuple[InputColumn, ...]:
     """Describe the numeric features with their scaling and the range of the training rows."""
     train = table.frame.iloc[table.rows("train")]
@@ -234,7 +309,7 @@ def input_columns(
         InputColumn(
             name=name,
             unit=VARIABLES[name].unit,
-            transform=transform,
+            transform=transforms[j],
             mean=float(mean[j]),
             scale=float(scale[j]),
             lower=float(train[name].min()),
@@ -249,7 +324,8 @@ def domain_constraints(table: Table) -> tuple[Constraint, ...]:
 
     Charge length, bench height and burden are tied: what the charge leaves of the hole is its
     stemming, and that was only trained between two multiples of the burden, the charge between two
-    shares of the bench. A charge was never shorter than some multiple of its diameter.
+    shares of the bench. A charge was never shorter than some multiple of its diameter. Spacing
+    went with the burden and tensile strength with the compressive one.
     """
     rules = []
     for label, parts, base, two_sided in _RATIOS:
@@ -259,15 +335,15 @@ def domain_constraints(table: Table) -> tuple[Constraint, ...]:
         ratio = sum(c * train[name] for name, c in parts.items()) / train[base]
         # A hair outward, so that rounding of the linear form keeps every training row inside.
         least, most = float(ratio.min()) - 1e-9, float(ratio.max()) + 1e-9
-        shown = base.replace("_", " ")
+        shown, unit = base.replace("_", " "), VARIABLES[base].unit
         rules.append(
-            Constraint(f"{label} at least {least:.3g} {shown}", {**parts, base: -least}, 0.0, "m")
+            Constraint(f"{label} at least {least:.3g} {shown}", {**parts, base: -least}, 0.0, unit)
         )
         if two_sided:
             negative = {name: -c for name, c in parts.items()}
             rules.append(
                 Constraint(
-                    f"{label} at most {most:.3g} {shown}", {**negative, base: most}, 0.0, "m"
+                    f"{label} at most {most:.3g} {shown}", {**negative, base: most}, 0.0, unit
                 )
             )
     return tuple(rules)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -12,7 +12,7 @@ import numpy as np
 from castblast import __version__
 from castblast.network import Floats, Network
 from castblast.progress import ProgressCallback, silent
-from castblast.specs.model import MlpSpec, ModelSpec
+from castblast.specs.model import ModelSpec
 from castblast.surrogate import estimators
 from castblast.surrogate.features import SPLITS, Split, Table, check_positive
 from castblast.surrogate.metrics import (
@@ -109,57 +109,82 @@ class Fit:
         )
 
 
-def fit_spec(spec: ModelSpec, table: Table, progress: ProgressCallback = silent) -> Fit:
+def fit_spec(
+    spec: ModelSpec,
+    table: Table,
+    progress: ProgressCallback = silent,
+    report: Callable[[float], None] | None = None,
+) -> Fit:
     """Fit a spec.
 
     Parameters
     ----------
     spec : ModelSpec
+        ``features: all`` is replaced by the names of what the dataset varies.
     table : Table
         Holds at least the features and targets of the spec.
     progress : callable
         Told after every restart.
+    report : callable, optional
+        Given the summary error on the validation rows now and then while a family with epochs is
+        fitted; what it raises ends the fit.
 
     Raises
     ------
     DatasetError
-        A column to be logged is not positive, or the error band is not finite.
+        A column to be logged is not positive, the dataset has no descriptors of the explosives
+        and the spec needs them, or the error band is not finite.
+    SpecError
+        A user's own model that cannot be made or used.
     """
     started = time.perf_counter()
+    spec = spec.resolved(table.varying or table.feature_names)
     table = table.select(spec.features, spec.targets)
-    logged = (table.feature_names if spec.input_transform == "log" else ()) + (
-        table.target_names if spec.target_transform == "log" else ()
-    )
-    check_positive(table, logged)
-    seeds = range(spec.seed, spec.seed + spec.restarts) if isinstance(spec, MlpSpec) else range(1)
+    logged = [name for name in table.feature_names if spec.transform_of(name) == "log"]
+    logged += table.target_names if spec.target_transform == "log" else ()
+    sums = {k: dict(e.coefficients) for k, e in spec.derived.items() if e.transform == "log"}
+    check_positive(table, logged, sums)
+    seeds = spec.seeds
     runs = []
     for number, seed in enumerate(seeds):
         progress(number / len(seeds), f"{spec.name}: start {number + 1} of {len(seeds)}")
-        runs.append(_run(spec, table, seed))
+        runs.append(_run(spec, table, seed, report))
     chosen = int(np.argmin([run[1].valid_error for run in runs]))
     estimator, restart, predicted = runs[chosen]
     calibration = table.rows("calibration")
     band = conformal_band(table.targets[calibration], predicted[calibration])
-    network = None
-    if estimators.is_exportable(spec):
-        provenance = _provenance(spec, table, predicted, band, restart)
-        network = estimators.to_network(estimator, spec, table, band, provenance)
+    provenance = _provenance(spec, table, predicted, band, restart)
+    network = estimators.to_network(estimator, spec, table, band, provenance)
     progress(1.0, f"{spec.name}: 95 % within {restart.valid_error:.2%} on validation rows")
     restarts = tuple(run[1] for run in runs)
     seconds = time.perf_counter() - started
     return Fit(spec, estimator, network, table, predicted, band, restarts, chosen, seconds)
 
 
-def _run(spec: ModelSpec, table: Table, seed: int) -> tuple[Any, Restart, Floats]:
+def _run(
+    spec: ModelSpec, table: Table, seed: int, report: Callable[[float], None] | None
+) -> tuple[Any, Restart, Floats]:
     """One fit from one seed, with its predictions for every row."""
     train, valid = table.rows("train"), table.rows("valid")
-    estimator = estimators.make_estimator(spec, table.explosives, seed)
+    estimator = estimators.make_estimator(spec, table, seed)
+
+    def valid_error(values: Floats) -> float:
+        scores = score_targets(table.targets[valid], values, table.target_names)
+        return summary_error(scores)
+
+    def watch(partial: Any) -> None:
+        if report is not None:
+            report(valid_error(estimators.predict(partial, table.frame.iloc[valid])))
+
     iterations, converged = estimators.fit_estimator(
-        estimator, spec, table.frame.iloc[train], table.targets[train]
+        estimator,
+        spec,
+        table.frame.iloc[train],
+        table.targets[train],
+        None if report is None else watch,
     )
     predicted = estimators.predict(estimator, table.frame)
-    scores = score_targets(table.targets[valid], predicted[valid], table.target_names)
-    error = summary_error(scores)
+    error = valid_error(predicted[valid])
     # A fit that blew up must never win.
     restart = Restart(seed, error if np.isfinite(error) else np.inf, iterations, converged)
     return estimator, restart, predicted
