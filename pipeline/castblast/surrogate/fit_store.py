@@ -7,6 +7,7 @@ by the version that wrote it only, and must not be taken from strangers. ``netwo
 from __future__ import annotations
 
 import hashlib
+import json
 import pickle
 from collections.abc import Mapping
 from functools import cache
@@ -33,7 +34,7 @@ _PACKAGE = Path(__file__).resolve().parent.parent
 
 
 def table_hash(table: Table) -> str:
-    """SHA-256 (hex) of the rows as a fit sees them: values, explosives, split."""
+    """SHA-256 (hex) of the rows as a fit sees them: values, explosives, split, descriptors."""
     digest = hashlib.sha256()
     for name in table.feature_names:
         digest.update(name.encode())
@@ -42,6 +43,7 @@ def table_hash(table: Table) -> str:
     digest.update(np.ascontiguousarray(table.targets, dtype=np.float64))
     for labels in (table.frame["explosive"], table.split):
         digest.update("\n".join(map(str, labels)).encode())
+    digest.update(json.dumps(table.descriptors, sort_keys=True).encode())
     return digest.hexdigest()
 
 

@@ -7,6 +7,7 @@ is cleared by the next one that holds the study.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,7 +26,7 @@ def hold_study(journal: Path) -> Iterator[None]:
     Raises
     ------
     SpecError
-        Another process holds it, it is a folder, or its end is none of a journal.
+        Another process holds it, it is a folder, or no journal.
     OSError
         The folder cannot be written to.
     """
@@ -39,7 +40,7 @@ def hold_study(journal: Path) -> Iterator[None]:
             message = f"{journal}: another process is at work on this study"
             raise SpecError(message)
         journal.with_name(f"{journal.name}.lock").unlink(missing_ok=True)
-        _drop_half_line(journal)
+        _mend(journal)
         yield
 
 
@@ -56,16 +57,24 @@ def _lock(stream: IO[str]) -> bool:
     return True
 
 
-def _drop_half_line(journal: Path) -> None:
-    """Cut off what follows the last line end: a record that was never written whole."""
+def _mend(journal: Path) -> None:
+    """Cut off a record that was never written whole; refuse a file that is no journal."""
     if not journal.is_file():
         return
     with journal.open("r+b") as stream:
-        content = stream.read()
-        whole = content.rfind(b"\n") + 1
-        if whole == len(content):
-            return
-        if not content[whole:].startswith(_RECORD[: len(content) - whole]):
-            message = f"{journal}: is no journal of a study, or a damaged one"
+        *lines, rest = stream.read().split(b"\n")
+        for number, line in enumerate(lines, start=1):
+            if not _is_record(line):
+                message = f"{journal}: is no journal of a study, or a damaged one (line {number})"
+                raise SpecError(message)
+        if not rest.startswith(_RECORD[: len(rest)]):
+            message = f"{journal}: is no journal of a study, or a damaged one (its end)"
             raise SpecError(message)
-        stream.truncate(whole)
+        stream.truncate(sum(len(line) + 1 for line in lines))
+
+
+def _is_record(line: bytes) -> bool:
+    try:
+        return line.startswith(_RECORD) and isinstance(json.loads(line), dict)
+    except ValueError:
+        return False
