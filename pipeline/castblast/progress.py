@@ -11,3 +11,8 @@ ProgressCallback: TypeAlias = Callable[[float, str], None]
 
 def silent(share: float, line: str) -> None:
     """Report nothing."""
+
+
+def part(progress: ProgressCallback, first: float, last: float) -> ProgressCallback:
+    """Report the progress of one step as the stretch from `first` to `last` of the whole."""
+    return lambda share, line: progress(first + share * (last - first), line)

@@ -7,6 +7,7 @@ from castblast.cli import (
     demo,
     explosive,
     generate,
+    infill,
     muckpile,
     predict,
     simulate,
@@ -40,7 +41,7 @@ def _options(
     """Take the options that stand before a verb."""
 
 
-for _module in (demo, predict, simulate, generate, surrogates, muckpile):
+for _module in (demo, predict, simulate, generate, surrogates, infill, muckpile):
     _module.add_to(app)
 app.add_typer(datasets.app, name="dataset")
 app.add_typer(explosive.app, name="explosive")

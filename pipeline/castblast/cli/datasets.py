@@ -66,19 +66,33 @@ def reproduce(
 def extend(
     screen: Screen,
     dataset: _Dataset,
-    add: Annotated[int, typer.Option("--add", min=1, help="Samples to add.")],
+    add: Annotated[
+        int | None, typer.Option("--add", min=1, help="Samples to draw.", show_default=False)
+    ] = None,
+    design: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV of the samples instead, such as castblast infill writes; all for training.",
+            show_default=False,
+        ),
+    ] = None,
     out: OutFolder = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
     restart: Restart = False,
 ) -> Mapping[str, Any]:
     """Add samples to a dataset: a new file with the next minor version; the old one stays."""
+    from castblast.errors import SpecError
     from castblast.stages.extend import extend as run
 
+    rows = add if design is None else design
+    if rows is None or None not in (add, design):
+        message = "give either --add N or --design FILE"
+        raise SpecError(message)
     with screen.progress("extend") as progress:
         outcome = run(
             dataset,
-            add,
+            rows,
             out,
             workers=workers,
             scheduler=scheduler,

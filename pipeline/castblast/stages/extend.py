@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from castblast.dataset.build import build_shards
-from castblast.dataset.design import extend_design, join_designs
+from castblast.dataset.design import Design, extend_design, join_designs
+from castblast.dataset.design_file import design_of_rows, read_design_file, rows_sha256
 from castblast.dataset.extend import Existing, read_existing
 from castblast.dataset.failures import require_success, summary
 from castblast.dataset.final import Rows, write_final
-from castblast.dataset.provenance import made_from, rows_hash
-from castblast.dataset.simulation import Simulator, blast_simulator
+from castblast.dataset.provenance import Parent, made_from, rows_hash
+from castblast.dataset.simulation import FloatArray, Simulator, blast_simulator
 from castblast.dataset.store import require_writable
 from castblast.dataset.work import Work
 from castblast.dataset.workplace import is_finished, open_work_folder
 from castblast.errors import SpecError
 from castblast.progress import ProgressCallback, silent
+from castblast.specs.recipe import Recipe
 from castblast.stages.generate import (
     GenerateOutcome,
     already_finished,
@@ -27,9 +31,43 @@ from castblast.stages.generate import (
 )
 
 
+@dataclass(frozen=True)
+class _NewRows:
+    """Rows to add: so many to be drawn, or those of a design file."""
+
+    count: int
+    parents: tuple[Parent, ...]
+    path: Path | None = None
+    chosen: tuple[dict[str, FloatArray], NDArray[np.int8]] | None = None
+
+    def design(self, existing: Existing, recipe: Recipe, simulator: Simulator) -> Design:
+        """Draw or complete the rows, with ids and a batch number after those there are."""
+        sample = int(existing.design.sample.max()) + 1
+        batch = int(existing.design.batch.max()) + 1
+        if self.chosen is not None:
+            where = str(self.path)
+            return design_of_rows(
+                recipe, simulator, *self.chosen, where, first_sample=sample, batch=batch
+            )
+        where = str(existing.path)
+        return extend_design(
+            recipe, simulator, where, add=self.count, first_sample=sample, first_batch=batch
+        )
+
+
+def _new_rows(existing: Existing, add: int | Path) -> _NewRows:
+    parents = existing.as_parents
+    if isinstance(add, int):
+        return _NewRows(add, parents)
+    names = tuple(entry.name for entry in existing.explosives)
+    chosen = read_design_file(add, existing.source.recipe, names)
+    own = parents[-1]._replace(design_sha256=rows_sha256(*chosen))
+    return _NewRows(len(chosen[1]), (*parents[:-1], own), add, chosen)
+
+
 def extend(
     dataset: Path,
-    add: int,
+    add: int | Path,
     out: Path | None = None,
     *,
     workers: int | None = None,
@@ -43,8 +81,9 @@ def extend(
     ----------
     dataset : Path
         Stays untouched; its rows are taken over, not simulated again.
-    add : int
-        New rows; their ids follow the largest so far.
+    add : int or Path
+        Number of new rows, or a design file of them (see `dataset.design_file`): those are all
+        training rows. Their ids follow the largest so far.
     out : Path, optional
         The netCDF file, or a folder for it; default: ``data/NAME/NEW_VERSION/data.nc``.
     workers, scheduler, restart
@@ -81,7 +120,7 @@ def extend(
 def produce_extension(
     existing: Existing,
     simulator: Simulator,
-    add: int,
+    add: int | Path,
     out: Path | None = None,
     *,
     workers: int | None = None,
@@ -90,8 +129,9 @@ def produce_extension(
     progress: ProgressCallback = silent,
 ) -> GenerateOutcome:
     """Extend a dataset with a given simulator; see `extend`."""
-    source = existing.extended_source(add)
-    recipe, parents = source.recipe, existing.as_parents
+    new_rows = _new_rows(existing, add)
+    source, parents = existing.extended_source(new_rows.count), new_rows.parents
+    recipe = source.recipe
     path = output_path(source, out)
     if path.resolve() == existing.path.resolve():
         message = f"{path}: is the dataset to be extended; choose another place with --out"
@@ -100,14 +140,7 @@ def produce_extension(
     origin = made_from(recipe, existing.explosives, parents)
     if not restart and is_finished(path, origin):
         return already_finished(path)
-    new = extend_design(
-        recipe,
-        simulator,
-        str(source.path),
-        add=add,
-        first_sample=int(existing.design.sample.max()) + 1,
-        first_batch=int(existing.design.batch.max()) + 1,
-    )
+    new = new_rows.design(existing, recipe, simulator)
     folder = open_work_folder(path, origin, restart=restart).resolve()
     work = Work(new, simulator, rows_hash(origin), folder, recipe.shard_size)
     lines = build_shards(work, workers=workers, scheduler=scheduler, progress=progress)
