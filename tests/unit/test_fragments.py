@@ -48,6 +48,22 @@ def test_kuz_ram_by_hand() -> None:
     assert new.uniformity == pytest.approx(1.3849, abs=2e-4)
 
 
+def test_worked_example_of_ouchterlony() -> None:
+    """Round 4 of Bararp (Ouchterlony 2005): x50 = 44.8 cm, n = 1.17 and b = 2.431.
+
+    A = 13, 9.24 kg a hole of 62.2 % of the strength of ANFO, 0.55 kg/m3 above grade, holes of 51 mm
+    on 1.8 m x 2.2 m with a deviation of 0.25 m, charged over 3.9 m of 5.2 m; largest block 2.0 m.
+    The height here is the one that gives that specific charge, charged over the same share.
+    """
+    height = 9.24 / (0.55 * 1.8 * 2.2)
+    charged = height * 3.9 / 5.2
+    round_4 = Pattern(13.0, 1.8, 2.2, height, 0.051, charged, 9.24, 0.622, drilling_deviation=0.25)
+    curve = kuz_ram(round_4, "1987")
+    assert curve.median == pytest.approx(0.448, abs=5e-4)
+    assert curve.uniformity == pytest.approx(1.17, abs=5e-3)
+    assert swebrec_like(curve, 2.0).undulation == pytest.approx(2.431, abs=5e-3)
+
+
 @pytest.mark.parametrize("year", ["1987", "2005"])
 def test_kuz_ram_goes_the_right_way(year: str) -> None:
     """More or stronger explosive gives finer rock, harder rock coarser; bad drilling less even."""
