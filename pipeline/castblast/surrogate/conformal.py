@@ -65,8 +65,11 @@ def conformal_band(truth: Floats, predicted: Floats, level: float = LEVEL) -> Fl
     Lei, G'Sell, Rinaldo, Tibshirani & Wasserman (2018), Distribution-free predictive inference
     for regression, J. Am. Stat. Assoc. 113, 1094-1111, algorithm 2 with scaled residuals.
     """
-    if math.ceil((len(truth) + 1) * level) > len(truth):
-        message = f"split 'calibration': {len(truth)} rows are too few for a {level:.0%} band"
+    # Of fewer rows no residual has the rank that the band needs; MAPIE asks for one row more.
+    if len(truth) < math.ceil(round(1.0 / (1.0 - level), 9)):
+        message = (
+            f"split 'calibration': {len(truth)} rows are too few for a {100 * level:.3g} % band"
+        )
         raise DatasetError(message)
     with np.errstate(divide="ignore", invalid="ignore"):
         residuals = (truth - predicted) / np.abs(predicted)
