@@ -13,11 +13,14 @@ from castblast.variables import VARIABLES
 
 Document = Mapping[str, Any]
 _CAPTIONS = {
+    "league": "95 % relative error per model and target, bars are 95 % intervals, dashed the marks",
+    "gate": "Which model breaks which rule of physics",
     "figure_2": "Learning curve, error histogram, predicted against simulated: {folder}",
-    "league": "League table: 95 % relative error per target, bars are 95 % intervals",
+    "learning_law": "Power law through the learning curve of the chosen model",
+    "shifts": "Error on kinds of rows never shown, beside the fit that saw such rows",
+    "strata": "Error of the chosen model over every input, in bins of equal count",
     "error_maps": "Where the chosen model errs: 95 % relative error over pairs of inputs",
-    "sobol": "Sobol indices of the chosen model",
-    "shifts": "Beyond random splits: error where a kind of rows was never shown",
+    "sobol": "Sobol indices of the chosen model; markers: the simulator's own",
 }
 
 
@@ -39,7 +42,7 @@ def write_page(path: Path, document: Document, costs: Document, files: Sequence[
     sections = [
         _league(document, costs, pictures),
         _marks(document),
-        _gate(document),
+        _gate(document, pictures),
         _learning(document, pictures),
         _shifts(document, pictures),
         _strata(document, pictures),
@@ -161,7 +164,7 @@ def _marks(document: Document) -> Section:
     return Section("Marks", tables=[Table(header, rows, caption)])
 
 
-def _gate(document: Document) -> Section | None:
+def _gate(document: Document, pictures: Sequence[Path]) -> Section | None:
     if not document["gate"]:
         return None
     points = [
@@ -184,7 +187,8 @@ def _gate(document: Document) -> Section | None:
         ["What every answer must obey, all over the joint domain of the dataset. A rule that the "
          "simulator itself breaks is not asked. A model that fails is not chosen."],
         [table],
-        points=points,
+        _pictures(pictures, "gate"),
+        points,
     )  # fmt: skip
 
 
@@ -214,7 +218,7 @@ def _learning(document: Document, pictures: Sequence[Path]) -> Section:
         ["A power law through the learning curve on test rows; nothing is promised where it does "
          "not describe the points."],
         [Table(header, rows)],
-        _pictures(pictures, "figure_2"),
+        _pictures(pictures, "learning_law") + _pictures(pictures, "figure_2"),
         met,
     )  # fmt: skip
 
@@ -248,32 +252,13 @@ def _shifts(document: Document, pictures: Sequence[Path]) -> Section | None:
 
 def _strata(document: Document, pictures: Sequence[Path]) -> Section:
     targets = document["targets"]
-    tables = []
-    kinds = document["strata"]["by_explosive"]
-    rows = [[_words(k), *(_share_of(s, t) for t in targets)] for k, s in _scored(kinds)]
-    tables.append(Table(("explosive", *map(_words, targets)), rows, "95 % relative error"))
-    for name, cells in document["strata"]["by_input"].items():
-        variable = VARIABLES[name]
-        rows = [
-            [
-                f"{variable.show(cell['lower'])} to {variable.show(cell['upper'])}",
-                *(_share_of(cell["targets"], target) for target in targets),
-            ]
-            for cell in cells
-        ]
-        tables.append(Table((_words(name), *map(_words, targets)), rows))
-    return Section(
-        "Where the chosen model errs", tables=tables, pictures=_pictures(pictures, "error_maps")
-    )
-
-
-def _scored(kinds: Any) -> list[tuple[str, Document]]:
-    """Scores by explosive, however they are nested."""
-    return [(name, entry.get("targets", entry)) for name, entry in kinds.items()]
-
-
-def _share_of(scores: Document, target: str) -> str:
-    return show_share(scores[target]["relative_error_95"]) if target in scores else ""
+    rows = [
+        [_words(kind), *(show_share(scores[name]["relative_error_95"]) for name in targets)]
+        for kind, scores in document["strata"]["by_explosive"].items()
+    ]
+    table = Table(("explosive", *map(_words, targets)), rows, "95 % relative error, test rows")
+    shown = _pictures(pictures, "strata") + _pictures(pictures, "error_maps")
+    return Section("Where the chosen model errs", tables=[table], pictures=shown)
 
 
 def _worst(document: Document) -> Section:
@@ -298,19 +283,32 @@ def _sobol(document: Document, pictures: Sequence[Path]) -> Section | None:
     if not sobol:
         return None
     tables = []
-    for part, caption in (("indices", "of the chosen model"), ("physics", "of the simulator")):
-        for target, inputs in (sobol.get(part) or {}).items():
-            rows = [
-                [_words(name), *(_index(entry, kind) for kind in ("first", "total"))]
-                for name, entry in inputs.items()
-                if isinstance(entry, Mapping) and "first" in entry
-            ]
-            if rows:
-                title = f"{_words(target)}, {caption}"
-                tables.append(Table(("input", "first order", "total"), rows, title))
+    for target, inputs in sobol["indices"].items():
+        checked = sobol["physics"]["targets"].get(target, {})
+        rows = []
+        for name, entry in inputs.items():
+            pair = checked.get(name, {})
+            rows.append(
+                [
+                    sobol["inputs"][name],
+                    *(_index(entry, kind) for kind in ("first", "total")),
+                    *(
+                        _index(pair[who], "total") if pair else ""
+                        for who in ("simulator", "surrogate")
+                    ),
+                ]
+            )
+        header = (
+            "varied",
+            "first order",
+            "total",
+            "total, simulator on few rows",
+            "total, model on the same rows",
+        )
+        tables.append(Table(header, rows, _words(target)))
     return Section(
         "Which inputs matter: Sobol indices",
-        [str(sobol.get("method", ""))],
+        [f"{sobol['method']}, {sobol['rows']:,} base points; 95 % intervals in brackets."],
         tables,
         _pictures(pictures, "sobol"),
     )

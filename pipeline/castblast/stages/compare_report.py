@@ -114,12 +114,39 @@ def _write_curve(folder: Path, fit: Fit, curve: Sequence[Any]) -> list[Path]:
 
 
 def _draw(out: Path, found: Comparison, document: Mapping[str, Any]) -> list[Path]:
-    """Pictures of the league, the error maps and the indices."""
-    return []
+    """Pictures of the league, of the gate, and of all that is asked of the chosen model."""
+    from castblast.report.error_figures import draw_error_maps, draw_shifts, draw_strata
+    from castblast.report.inquiry_figures import draw_learning_laws, draw_sobol
+    from castblast.report.league_figures import draw_gate, draw_league
+    from castblast.surrogate.strata import error_maps
+
+    name = found.chosen.spec.name
+    files = [
+        draw_league(out / "league.png", document),
+        draw_strata(out / "strata.png", f"{name}: error by input", document["strata"]),
+    ]
+    targets = found.chosen.table.target_names
+    headline = _HEADLINE if _HEADLINE in targets else targets[0]
+    maps = error_maps(found.chosen, headline)
+    if maps:
+        title = f"{name}: where {headline.replace('_', ' ')} errs"
+        files.append(draw_error_maps(out / "error_maps.png", title, maps))
+    if found.gates:
+        files.append(draw_gate(out / "gate.png", found.gates))
+    if found.shifts:
+        files.append(draw_shifts(out / "shifts.png", document["shifts"]))
+    if found.sobol is not None:
+        title = f"{name}: Sobol indices over the domain"
+        files.append(draw_sobol(out / "sobol.png", title, document["sobol"]))
+    if name in document["learning"]:
+        title = f"{name}: power law through the learning curve"
+        law = draw_learning_laws(out / "learning_law.png", title, document["learning"][name])
+        files.append(law)
+    return files
 
 
 def outcome(found: Comparison, out: Path) -> TrainOutcome:
-    """What the screen shows of a comparison."""
+    """Give what the screen shows of a comparison."""
     league = found.league
     targets, paper = league["targets"], league["paper"]
     header = ["model", "gate", *(f"{name.replace('_', ' ')}: R², 95 %" for name in targets)]

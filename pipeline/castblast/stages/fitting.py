@@ -132,12 +132,12 @@ def part_of(progress: ProgressCallback, number: int, parts: int) -> ProgressCall
 def _fit_and_keep(
     spec: ModelSpec, table: Table, place: Path, key: dict[str, str], progress: ProgressCallback
 ) -> Fit:
-    from castblast.surrogate.fit_store import save_fit
+    from castblast.surrogate.fit_store import save_kept
     from castblast.surrogate.training import fit_spec
 
     fit = fit_spec(spec, table, progress)
     _write_files(place.parent, fit)
-    save_fit(place, spec, fit, key)
+    save_kept(place, fit, key, spec)
     return fit
 
 

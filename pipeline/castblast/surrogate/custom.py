@@ -69,7 +69,7 @@ class CustomModel(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             There is no such factory, or what it makes cannot be fitted or used.
         """
         targets = np.asarray(y, dtype=np.float64)
-        with _importable(self.folder):
+        with importable(self.folder):
             self.model_ = self._make(x.shape[1], 1 if targets.ndim == 1 else targets.shape[1])
             try:
                 self.model_.fit(x, y)
@@ -87,7 +87,7 @@ class CustomModel(RegressorMixin, BaseEstimator):  # type: ignore[misc]
 
     def predict(self, x: Any) -> Floats:
         """Evaluate scaled rows (n, k)."""
-        with _importable(self.folder):
+        with importable(self.folder):
             values: Floats = np.asarray(self.model_.predict(x), dtype=np.float64)
         return values
 
@@ -164,7 +164,7 @@ def load_factory(factory: str) -> Callable[..., Any]:
 
 
 @contextmanager
-def _importable(folder: str) -> Iterator[None]:
+def importable(folder: str) -> Iterator[None]:
     """Modules of a folder can be imported, for as long as this lasts."""
     if not folder:
         yield

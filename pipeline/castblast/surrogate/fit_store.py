@@ -20,14 +20,16 @@ import numpy as np
 
 from castblast import __version__
 from castblast.files import write_with
-from castblast.specs.model import ModelSpec
+from castblast.specs.model import CustomSpec, ModelSpec
+from castblast.surrogate.custom import importable
 from castblast.surrogate.features import Table
 from castblast.surrogate.training import Fit
 
 #: Modules of this folder that look at fits but have no part in making one.
 _OBSERVERS = (
     "comparison", "gate", "shifts", "strata", "learning", "sensitivity", "tuning", "tuning_space",
-    "study_file", "tracking", "logged_model", "run_list", "infill", "probe", "domain", "fit_store",
+    "study_file", "timing", "tracking", "logged_model", "run_list", "infill", "probe",
+    "domain", "fit_store",
 )  # fmt: skip
 _LIBRARIES = ("numpy", "scikit-learn", "torch")
 _PACKAGE = Path(__file__).resolve().parent.parent
@@ -38,9 +40,9 @@ def table_hash(table: Table) -> str:
     digest = hashlib.sha256()
     for name in table.feature_names:
         digest.update(name.encode())
-        digest.update(np.ascontiguousarray(table.frame[name].to_numpy(dtype=np.float64)))
+        digest.update(table.frame[name].to_numpy(dtype=np.float64).tobytes())
     digest.update(" ".join(table.target_names).encode())
-    digest.update(np.ascontiguousarray(table.targets, dtype=np.float64))
+    digest.update(np.asarray(table.targets, dtype=np.float64).tobytes())
     for labels in (table.frame["explosive"], table.split):
         digest.update("\n".join(map(str, labels)).encode())
     digest.update(json.dumps(table.descriptors, sort_keys=True).encode())
@@ -58,7 +60,7 @@ def fit_key(spec: ModelSpec, table: Table) -> dict[str, str]:
         "dataset": table.source.get("content_sha256", ""),
         "rows": table_hash(own),
         "code": _code_hash(),
-        "factory": _factory_hash(getattr(spec, "factory", None)),
+        "factory": _factory_hash(spec),
         **{library: _version(library) for library in _LIBRARIES},
     }
 
@@ -77,14 +79,15 @@ def _code_hash() -> str:
     return digest.hexdigest()
 
 
-def _factory_hash(factory: str | None) -> str:
+def _factory_hash(spec: ModelSpec) -> str:
     """SHA-256 of the module of a user's own ``module:factory``; empty where there is none."""
-    if not factory:
+    if not isinstance(spec, CustomSpec):
         return ""
-    try:
-        found = find_spec(factory.partition(":")[0])
-    except (ImportError, ValueError):
-        return ""
+    with importable(str(spec.folder)):
+        try:
+            found = find_spec(spec.factory.partition(":")[0])
+        except (ImportError, ValueError):
+            return ""
     if found is None or not found.origin or not Path(found.origin).is_file():
         return ""
     return hashlib.sha256(Path(found.origin).read_bytes()).hexdigest()
@@ -97,45 +100,44 @@ def _version(library: str) -> str:
         return ""
 
 
-def save_kept(path: Path, value: Any, key: Mapping[str, str]) -> bool:
+def save_kept(path: Path, value: Any, key: Mapping[str, str], spec: Any = None) -> bool:
     """Keep a result with what it was made from; False where it cannot be pickled.
 
     That may happen to a fit whose estimator is a user's own.
     """
     try:
-        content = pickle.dumps({"key": dict(key), "value": value}, protocol=5)
+        inside = pickle.dumps(value, protocol=5)
     except (pickle.PicklingError, AttributeError, TypeError):
         return False
+    content = pickle.dumps({"key": dict(key), "spec": spec, "value": inside}, protocol=5)
     write_with(path, lambda name: name.write_bytes(content))
     return True
 
 
 def load_kept(path: Path, key: Mapping[str, str]) -> Any:
     """Give what was made from exactly `key`; None if there is none or it is unreadable."""
-    stored = _read(path)
-    return stored["value"] if stored and stored["key"] == dict(key) else None
-
-
-def save_fit(path: Path, spec: ModelSpec, fit: Fit, key: Mapping[str, str]) -> bool:
-    """Keep a fit with the spec as it was given, which may leave the features to the dataset."""
-    return save_kept(path, (spec, fit), key)
+    stored = _unpickle(path.read_bytes()) if path.is_file() else None
+    if not isinstance(stored, dict) or stored.get("key") != dict(key):
+        return None
+    with importable(str(getattr(stored.get("spec"), "folder", ""))):
+        return _unpickle(stored["value"])
 
 
 def load_fit(path: Path, key: Mapping[str, str]) -> Fit | None:
     """Give the fit that was made from exactly `key`, if it is there."""
-    kept = load_kept(path, key)
-    return kept[1] if kept else None
+    fit = load_kept(path, key)
+    return fit if isinstance(fit, Fit) else None
 
 
 def kept_spec(path: Path) -> ModelSpec | None:
     """Spec of the fit that is kept in a file, whatever it was fitted on; None if unreadable."""
-    stored = _read(path)
-    return stored["value"][0] if stored else None
+    stored = _unpickle(path.read_bytes())
+    spec: ModelSpec | None = stored.get("spec") if isinstance(stored, dict) else None
+    return spec
 
 
-def _read(path: Path) -> dict[str, Any] | None:
+def _unpickle(content: bytes) -> Any:
     try:
-        stored: Any = pickle.loads(path.read_bytes())
+        return pickle.loads(content)
     except Exception:  # whatever a damaged or older file raises: the result is made again
         return None
-    return stored if isinstance(stored, dict) and {"key", "value"} <= stored.keys() else None

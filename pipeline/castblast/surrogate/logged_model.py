@@ -1,7 +1,8 @@
 """How a fitted model goes into the lab book: in the flavour that its family has there.
 
-Stock scikit-learn estimators and torch modules go in as such. Another estimator is not stored, and
-its run says so; its ``network.json``, if it has one, is among the files of the run all the same.
+Torch networks go in as modules from scaled columns to scaled targets, everything else as the
+scikit-learn estimator it is. Our own steps in such an estimator need castblast where it is loaded.
+A user's own estimator is not stored, as it may hold anything, and its run says so.
 """
 
 from __future__ import annotations
@@ -14,8 +15,10 @@ import numpy as np
 from castblast.surrogate.estimators import predict
 from castblast.surrogate.training import Fit
 
-#: Functions of our stock pipelines that skops does not trust by itself.
-_TRUSTED = ["numpy.log", "numpy.exp"]
+#: Classes whose state skops may restore: functions of our stock pipelines, and our own.
+_FUNCTIONS = ["numpy.log", "numpy.exp"]
+_TORCH = "castblast.surrogate.torch_mlp"
+_OWN = ("castblast.", "sklearn.", "numpy.")
 
 
 def log_model(mlflow: Any, fit: Fit) -> tuple[str | None, str]:
@@ -30,44 +33,62 @@ def log_model(mlflow: Any, fit: Fit) -> tuple[str | None, str]:
     Returns
     -------
     uri : str or None
-        Of the logged model; None where there is no way to store it.
+        Of the logged model; None where it is not stored.
     flavour : str
         "sklearn", "pytorch" or "none".
     """
     rows = fit.table.frame.iloc[fit.table.rows("train")].head(2)
-    module = getattr(fit.estimator, "module", None)
-    if module is not None and hasattr(fit.estimator, "module_inputs"):
-        return _log_module(mlflow, fit, module, rows), "pytorch"
-    signature = mlflow.models.infer_signature(rows, _frame(fit, predict(fit.estimator, rows)))
-    if _is_stock(fit.estimator):
-        info = mlflow.sklearn.log_model(
-            fit.estimator,
-            name="model",
-            signature=signature,
-            pip_requirements=_requirements("scikit-learn", "numpy", "pandas"),
-            skops_trusted_types=_TRUSTED,
-        )
-        return str(info.model_uri), "sklearn"
-    return None, "none"
+    model = fit.estimator.regressor_["model"]
+    model = getattr(model, "model_", model)
+    if type(model).__module__ == _TORCH:
+        return _log_module(mlflow, fit, model, rows), "pytorch"
+    if not _is_known(fit.estimator):
+        return None, "none"
+    info = mlflow.sklearn.log_model(
+        fit.estimator,
+        name="model",
+        signature=mlflow.models.infer_signature(rows, _frame(fit, predict(fit.estimator, rows))),
+        pip_requirements=_requirements("scikit-learn", "numpy", "pandas", "scipy"),
+        skops_trusted_types=[*_FUNCTIONS, *_own_types(fit.estimator)],
+    )
+    return str(info.model_uri), "sklearn"
 
 
-def _log_module(mlflow: Any, fit: Fit, module: Any, rows: Any) -> str:
-    """A torch module takes and gives scaled columns; two rows leave the batch size open."""
-    inputs = np.asarray(fit.estimator.module_inputs(rows))
+def _log_module(mlflow: Any, fit: Fit, model: Any, rows: Any) -> str:
+    """Log a torch module; the example of two rows leaves the number of rows open."""
+    from castblast.surrogate.torch_mlp import as_module
+
+    columns = np.asarray(fit.estimator.regressor_["columns"].transform(rows), dtype=np.float64)
+    scaled = np.asarray(model.predict(columns), dtype=np.float64).reshape(len(columns), -1)
     info = mlflow.pytorch.log_model(
-        module, name="model", input_example=inputs, pip_requirements=_requirements("torch", "numpy")
+        as_module(model),
+        name="model",
+        input_example=columns,
+        signature=mlflow.models.infer_signature(columns, scaled),
+        pip_requirements=_requirements("torch", "numpy"),
     )
     return str(info.model_uri)
 
 
-def _is_stock(estimator: Any) -> bool:
-    """Whether every part of an estimator is scikit-learn's own."""
-    parts = [estimator, *estimator.get_params(deep=True).values()]
-    return all(
-        type(part).__module__.startswith("sklearn.")
-        for part in parts
-        if hasattr(part, "get_params")
-    )
+def _parts(estimator: Any) -> list[Any]:
+    """An estimator and everything inside it that has parameters."""
+    found = [estimator, *estimator.get_params(deep=True).values()]
+    fitted = [estimator.regressor_["model"], estimator.transformer_]
+    return [part for part in (*found, *fitted) if hasattr(part, "get_params")]
+
+
+def _is_known(estimator: Any) -> bool:
+    """Whether every part of an estimator is scikit-learn's or ours."""
+    model = getattr(estimator.regressor_["model"], "model_", estimator.regressor_["model"])
+    return all(type(part).__module__.startswith(_OWN) for part in (*_parts(estimator), model))
+
+
+def _own_types(estimator: Any) -> list[str]:
+    """Types in an estimator that skops asks about, as far as they are known ones."""
+    import skops.io  # type: ignore[import-untyped]
+
+    names: list[str] = skops.io.get_untrusted_types(data=skops.io.dumps(estimator))
+    return [name for name in names if name.startswith(_OWN)]
 
 
 def _frame(fit: Fit, values: Any) -> Any:

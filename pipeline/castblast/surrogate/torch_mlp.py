@@ -342,6 +342,24 @@ def dense_chain(module: torch.nn.Module) -> Chain | None:
     return tuple(layers) or None
 
 
+def as_module(model: TorchMlp | TorchRegressor) -> torch.nn.Module:
+    """A fitted model as a module from scaled columns to scaled targets, float64."""
+    if isinstance(model, TorchRegressor):
+        module: torch.nn.Module = model.module_.eval()
+        return module
+    parts: list[torch.nn.Module] = []
+    for layer in model.layers_:
+        inputs, outputs = layer.weights.shape
+        part = torch.nn.Linear(inputs, outputs, dtype=torch.float64)
+        with torch.no_grad():
+            part.weight.copy_(torch.from_numpy(np.ascontiguousarray(layer.weights.T)))
+            part.bias.copy_(torch.from_numpy(np.asarray(layer.biases)))
+        parts.append(part)
+        if layer.activation != "identity":
+            parts.append(_MODULES[layer.activation]())
+    return torch.nn.Sequential(*parts).eval()
+
+
 def _flat(module: torch.nn.Module) -> Iterator[torch.nn.Module]:
     for part in module.children():
         if isinstance(part, torch.nn.Sequential):
