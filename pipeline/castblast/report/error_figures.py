@@ -43,19 +43,18 @@ def draw_error_maps(path: Path, title: str, planes: Sequence[Document]) -> Path:
 
 
 def _draw_plane(axis: Any, plane: Document, error: Any, most: float) -> Any:
-    across, up = VARIABLES[plane["across"]], VARIABLES[plane["up"]]
-    x = np.array(plane["across_edges"]) * across.display_factor
-    y = np.array(plane["up_edges"]) * up.display_factor
-    shades = axis.pcolormesh(x, y, error.T, cmap="YlOrRd", vmin=0.0, vmax=most)
+    """Cells of equal size, as each holds as many values of its input; the ends are labelled."""
+    shades = axis.pcolormesh(error.T, cmap="YlOrRd", vmin=0.0, vmax=most)
     for i, j in np.ndindex(*error.shape):
         if np.isfinite(error[i, j]):
-            axis.text(0.5 * (x[i] + x[i + 1]), 0.5 * (y[j] + y[j + 1]), f"{error[i, j]:.2g}",
-                      ha="center", va="center", fontsize=6,
+            axis.text(i + 0.5, j + 0.5, f"{error[i, j]:.2g}", ha="center", va="center", fontsize=7,
                       color="white" if error[i, j] > 0.65 * most else "black")  # fmt: skip
-    axis.set(
-        xlabel=f"{words(across.name)} [{across.shown_unit}]",
-        ylabel=f"{words(up.name)} [{up.shown_unit}]",
-    )
+    for side, name in ((axis.xaxis, plane["across"]), (axis.yaxis, plane["up"])):
+        variable = VARIABLES[name]
+        edges = plane["across_edges" if side is axis.xaxis else "up_edges"]
+        shown = [f"{edge * variable.display_factor:.3g}" for edge in edges]
+        side.set_ticks(range(len(edges)), shown, fontsize=7)
+        side.set_label_text(f"{words(name)} [{variable.shown_unit}]")
     axis.grid(visible=False)
     return shades
 
@@ -124,10 +123,10 @@ def draw_shifts(path: Path, shifts: Mapping[str, Document]) -> Path:
     plain_log_ticks(axis.xaxis)
     axis.set_yticks(range(len(tests)), tests, fontsize=8)
     axis.set_ylim(len(tests) - 0.4, -0.6)
-    axis.set_title("Rows unlike those trained on")
-    axis.set_xlabel("geometric mean of the 95 % relative errors [%]; "
-                    "open: such rows were seen, filled: they were not")  # fmt: skip
-    axis.legend(loc="upper right")
+    figure.suptitle("Rows unlike those trained on; open: such rows were seen, filled: they were not",
+                    fontsize=11)  # fmt: skip
+    axis.set_xlabel("geometric mean of the 95 % relative errors [%]")
+    figure.legend(loc="outside lower center", ncols=3)
     return save_figure(figure, path)
 
 

@@ -48,7 +48,9 @@ def draw_sobol(path: Path, title: str, report: Document) -> Path:
         _draw_indices(axis, report, target, order)
     for axis in axes.ravel()[len(targets) :]:
         axis.set_visible(False)
-    axes[0, 0].set_yticks(range(len(order)), [inputs[name] for name in order], fontsize=8)
+    axes[0, 0].set_yticks(range(len(order)), [inputs[name] for name in order])
+    for axis in axes[:, 0]:
+        axis.tick_params(axis="y", labelsize=8)
     axes[0, 0].set_ylim(len(order) - 0.4, -0.6)
     handles, labels = axes.ravel()[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
@@ -69,13 +71,13 @@ def _draw_indices(axis: Any, report: Document, target: str, order: Sequence[str]
         axis.barh(places, values, height=0.36, color=colour, label=words_)
         axis.hlines(places, ends[:, 0], ends[:, 1], color="#444444", linewidth=0.9)
         checked = [(k, physics[name]) for k, name in enumerate(order) if name in physics]
-        for model, marker, face in (("simulator", "D", "black"), ("surrogate", "D", "white")):
+        for model, size, face in (("simulator", 6.0, "black"), ("surrogate", 2.5, "white")):
             if not checked:
                 continue
             axis.plot(
                 [entry[model][kind] for _, entry in checked],
                 [k + shift for k, _ in checked],
-                marker, markersize=4, color="black", markerfacecolor=face, linestyle="none",
+                "D", markersize=size, color=face, linestyle="none",
                 label=f"{model}, {report['physics']['rows']:,} rows" if kind == "total" else None,
             )  # fmt: skip
     axis.set_title(words(target), fontsize=9)
@@ -122,17 +124,24 @@ def _draw_law(axis: Any, target: str, entry: Document) -> None:
             )
         dash = "-" if entry["trusted"] else ":"
         axis.loglog(ahead, 100.0 * error, dash, color=BLUE, linewidth=1.2,
-                    label=f"{100 * law['floor']:.2g} % + c n^-{law['exponent']:.2g}")  # fmt: skip
+                    label=_formula(law, entry["trusted"]))  # fmt: skip
     axis.loglog(rows, _percents(entry["error"]), "o", color=BLUE, label="test rows")
     axis.axhline(100.0 * entry["mark"], **_MARK)
-    axis.text(rows.min(), 100.0 * entry["mark"], f"mark {100 * entry['mark']:g} %", fontsize=7,
-              va="bottom")  # fmt: skip
+    axis.text(0.99, 100.0 * entry["mark"], f"mark {100 * entry['mark']:g} %", fontsize=7,
+              ha="right", va="bottom", transform=axis.get_yaxis_transform())  # fmt: skip
     if needed is not None:
         axis.plot(needed, 100.0 * entry["mark"], "*", color=RED, markersize=11,
                   label=f"{needed:,} runs needed")  # fmt: skip
     axis.set(title=words(target), xlabel="training rows", ylabel="95 % of errors below [%]")
     plain_log_ticks(axis.yaxis)
     axis.legend(fontsize=7)
+
+
+def _formula(law: Document, trusted: bool) -> str:
+    floor = 100.0 * law["floor"]
+    constant = f"{floor:.2g} % + " if floor > 1e-4 else ""
+    doubt = "" if trusted else ", not trusted"
+    return f"{constant}c $n^{{-{law['exponent']:.2g}}}${doubt}"
 
 
 def _percents(values: Sequence[float]) -> Floats:

@@ -133,7 +133,7 @@ def draw_gate(path: Path, gates: Mapping[str, Document]) -> Path:
     axis.tick_params(length=0)
     for spine in axis.spines.values():
         spine.set_visible(False)
-    axis.set_title("Physics gate: share of wrong answers in the joint domain; grey: not asked")
+    figure.suptitle("Physics gate: share of wrong answers; grey: not asked", fontsize=11)
     return save_figure(figure, path)
 
 

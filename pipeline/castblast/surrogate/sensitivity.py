@@ -104,8 +104,8 @@ def sobol_report(
     rows : int
         Base sample; 2 evaluations of the surrogate a row, and 2 more per input.
     checked : sequence of str
-        Inputs whose indices the simulator gives as well; default: the three that matter most to
-        the burden velocity.
+        Inputs whose indices the simulator gives as well; default: the two that matter most to
+        the burden velocity and the one that matters most to each other target.
     checked_rows : int
         Base sample of the check: 2 runs of the simulator (1.3 ms) a row and 2 more per input; 0:
         no check.
@@ -142,8 +142,7 @@ def sobol_report(
     samples = draw_samples(names, possible, rows, seed, progress=progress)
     indices = _by_target(sobol_indices(samples, ask), surrogate.targets)
     if not checked:
-        ranked = indices[headline]
-        checked = sorted(ranked, key=lambda name: -ranked[name].total)[:3]
+        checked = _what_matters(indices, headline)
     physics: dict[str, Any] = {}
     if checked_rows:
         progress(0.7, "Sobol indices: simulator")
@@ -172,6 +171,15 @@ def sobol_report(
         },
         "physics": {"rows": checked_rows, "targets": physics},
     }
+
+
+def _what_matters(indices: Mapping[str, Mapping[str, Index]], headline: str) -> list[str]:
+    """Inputs of the largest total indices: two of the headline, one of every other target."""
+    found: dict[str, None] = {}
+    for target, entries in indices.items():
+        ranked = sorted(entries, key=lambda name: -entries[name].total)
+        found |= dict.fromkeys(ranked[: 2 if target == headline else 1])
+    return list(found)
 
 
 def _meaning(domain: Domain, name: str) -> str:

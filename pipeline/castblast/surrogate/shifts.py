@@ -102,7 +102,10 @@ def _explosives(table: Table) -> Iterator[Shift]:
 
 
 def _corner(table: Table) -> Shift:
-    """Rows outside the box, of equal share of every input, that holds `_INNER` of the rows."""
+    """Rows outside the box that holds `_INNER` of the rows, the same share of every input.
+
+    What lies outside is at one of the two ends of an input.
+    """
     numeric = table.frame[list(table.feature_names)].to_numpy(dtype=np.float64)
     train = table.rows("train")
     reach = np.zeros(len(numeric))
@@ -111,7 +114,7 @@ def _corner(table: Table) -> Shift:
         share = np.searchsorted(ordered, column) / len(ordered)
         reach = np.maximum(reach, np.abs(2.0 * share - 1.0))
     edge = float(np.quantile(reach[train], _INNER))
-    says = f"some input in the outer {1.0 - edge:.1%} of its values, half of them at each end"
+    says = f"some input in its outer {1.0 - edge:.1%}"
     return Shift("corner", "the outer box", says, reach > edge)
 
 
