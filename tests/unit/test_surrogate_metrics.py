@@ -5,10 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from castblast.errors import DatasetError
 from castblast.surrogate.metrics import (
-    conformal_band,
-    coverage,
     error_quantile,
     r_squared,
     score,
@@ -56,40 +53,3 @@ def test_summary_is_the_geometric_mean() -> None:
     truth = np.array([1.0, 2.0])
     scores = {"a": score(truth, truth * 1.01), "b": score(truth, truth * 1.04)}
     assert summary_error(scores) == pytest.approx(0.02)
-
-
-def test_conformal_rank() -> None:
-    """With 39 residuals the 95 % band is the 38th smallest: ceil(40 x 0.95) = 38."""
-    predicted = np.full((39, 1), 10.0)
-    truth = predicted * (1.0 + 0.001 * np.arange(1, 40)[:, None])
-    assert conformal_band(truth, predicted) == pytest.approx(0.038)
-
-
-def test_conformal_band_covers_as_the_theorem_says() -> None:
-    """Exchangeable residuals: mean coverage is exactly ceil(0.95 (n + 1)) / (n + 1).
-
-    With n = 39 that is 0.95. 4,000 independent calibrations, the coverage of each computed from
-    the distribution itself (relative errors uniform in 0 to 1 %); Beta(38, 2) has a standard
-    deviation of 0.034, so the mean is known to 0.0005.
-    """
-    rng = np.random.default_rng(1)
-    predicted = np.full((39, 4000), 100.0)
-    truth = predicted * (1.0 + 0.01 * rng.random((39, 4000)) * rng.choice([-1, 1], (39, 4000)))
-    shares = conformal_band(truth, predicted) / 0.01
-    assert shares.mean() == pytest.approx(0.95, abs=4 * 0.034 / math.sqrt(4000))
-
-
-def test_coverage_counts_rows() -> None:
-    predicted = np.full((10, 1), 10.0)
-    truth = predicted + 0.1 * np.arange(10)[:, None]
-    assert coverage(truth, predicted, np.array([0.0451])) == pytest.approx(0.5)
-
-
-def test_too_few_calibration_rows_are_refused() -> None:
-    with pytest.raises(DatasetError, match="18 rows are too few"):
-        conformal_band(np.ones((18, 1)), np.ones((18, 1)))
-
-
-def test_a_band_around_zero_is_refused() -> None:
-    with pytest.raises(DatasetError, match="not finite"):
-        conformal_band(np.ones((40, 1)), np.zeros((40, 1)))

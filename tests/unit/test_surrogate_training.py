@@ -8,7 +8,7 @@ import pytest
 
 from castblast.errors import DatasetError, SpecError
 from castblast.export.json_file import to_json
-from castblast.network import domain_faults, evaluate
+from castblast.network import domain_violations, evaluate
 from castblast.specs.model import (
     PAPER_FEATURES,
     PAPER_TARGETS,
@@ -65,10 +65,12 @@ def test_network_is_the_estimator(fit, table) -> None:
 
 
 def test_training_rows_lie_in_the_domain(fit, table) -> None:
+    """All of them in the ranges and rules; by the joint density up to a per cent may be unusual."""
     train = table.frame.iloc[table.rows("train")][list(table.feature_names)]
-    assert not [
-        fault for row in train.to_dict("records") for fault in domain_faults(fit.network, row)
-    ]
+    rows = train.to_dict("records")
+    faults = [fault for row in rows for fault in domain_violations(fit.network, row)]
+    assert {fault.kind for fault in faults} <= {"density"}
+    assert len(faults) <= 0.02 * len(rows)
 
 
 def test_same_spec_same_bytes(fit, table) -> None:

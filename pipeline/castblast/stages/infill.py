@@ -129,7 +129,7 @@ def _spread(
     with reading_dataset(existing.path) as dataset:
         table = read_table(dataset, found.features, found.targets)
     fits = fit_members(found, table, members, progress)
-    frame = pd.DataFrame({name: pool.inputs[name] for name in found.features})
+    frame = pd.DataFrame({name: pool.inputs[name] for name in fits[0].spec.features})
     return found.targets, ensemble_spread(fits, frame.assign(explosive=labels))
 
 

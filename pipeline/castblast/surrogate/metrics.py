@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.errors import DatasetError
 from castblast.network import Floats
 
 #: Bound on the relative error whose share is reported.
@@ -102,46 +101,3 @@ def summary_error(scores: dict[str, Score]) -> float:
     errors = np.array([entry.relative_error_95 for entry in scores.values()])
     with np.errstate(divide="ignore"):
         return float(np.exp(np.mean(np.log(errors))))
-
-
-def conformal_band(truth: Floats, predicted: Floats) -> Floats:
-    """Split-conformal 95 % band relative to the prediction, per target.
-
-    Parameters
-    ----------
-    truth, predicted : (n, m)
-        Calibration rows, used for nothing else.
-
-    Returns
-    -------
-    (m,)
-        q such that a new truth of the same distribution lies in predicted x (1 -+ q) with a
-        probability of at least 95 %, over the draw of calibration and new rows.
-
-    Raises
-    ------
-    DatasetError
-        Too few rows for a finite band, or a prediction of 0.
-
-    References
-    ----------
-    Lei, G'Sell, Rinaldo, Tibshirani & Wasserman (2018), Distribution-free predictive inference
-    for regression, J. Am. Stat. Assoc. 113, 1094-1111, algorithm 2 with scaled residuals.
-    """
-    rank = math.ceil((len(truth) + 1) * LEVEL)
-    if rank > len(truth):
-        message = f"split 'calibration': {len(truth)} rows are too few for a 95 % band"
-        raise DatasetError(message)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        residuals = np.abs(truth - predicted) / np.abs(predicted)
-    band: Floats = np.sort(residuals, axis=0)[rank - 1]
-    if not np.isfinite(band).all():
-        message = "the error band is not finite: predictions of the calibration rows reach 0"
-        raise DatasetError(message)
-    return band
-
-
-def coverage(truth: Floats, predicted: Floats, band: Floats) -> Floats:
-    """Share of rows whose truth lies in predicted x (1 -+ band), per target."""
-    inside = np.abs(truth - predicted) <= band * np.abs(predicted)
-    return np.asarray(np.mean(inside, axis=0))

@@ -14,11 +14,11 @@ from castblast.network import Floats, Network
 from castblast.progress import ProgressCallback, silent
 from castblast.specs.model import ModelSpec
 from castblast.surrogate import estimators
+from castblast.surrogate.conformal import band_coverage, conformal_band
+from castblast.surrogate.density import with_density
 from castblast.surrogate.features import SPLITS, Split, Table, check_positive
 from castblast.surrogate.metrics import (
     Score,
-    conformal_band,
-    coverage,
     score_by_explosive,
     score_targets,
     summary_error,
@@ -155,6 +155,8 @@ def fit_spec(
     band = conformal_band(table.targets[calibration], predicted[calibration])
     provenance = _provenance(spec, table, predicted, band, restart)
     network = estimators.to_network(estimator, spec, table, band, provenance)
+    if network is not None:
+        network = with_density(network, table)
     progress(1.0, f"{spec.name}: 95 % within {restart.valid_error:.2%} on validation rows")
     restarts = tuple(run[1] for run in runs)
     seconds = time.perf_counter() - started
@@ -200,7 +202,7 @@ def _provenance(
         rows = table.rows(split)
         scores[split] = score_targets(table.targets[rows], predicted[rows], names)
     test = table.rows("test")
-    covered = coverage(table.targets[test], predicted[test], band)
+    covered = band_coverage(table.targets[test], predicted[test], band)
     return {
         "castblast_version": __version__,
         "dataset": dict(table.source),
@@ -214,7 +216,10 @@ def _provenance(
         "valid_error": restart.valid_error,
         "scores": _nested(scores),
         "band": dict(zip(names, band.tolist(), strict=True)),
-        "band_coverage_on_test": dict(zip(names, covered.tolist(), strict=True)),
+        "band_coverage_on_test": {n: found.share for n, found in zip(names, covered, strict=True)},
+        "band_coverage_interval": {
+            n: [found.lower, found.upper] for n, found in zip(names, covered, strict=True)
+        },
     }
 
 
