@@ -12,6 +12,8 @@ from castblast.stages.train import show_r_squared, show_share
 from castblast.variables import VARIABLES
 
 Document = Mapping[str, Any]
+#: Broken rules named per model; the picture shows all.
+_REASONS = 3
 _CAPTIONS = {
     "league": "95 % relative error per model and target, bars are 95 % intervals, dashed the marks",
     "gate": "Which model breaks which rule of physics",
@@ -72,48 +74,51 @@ _LIMITS = (
 
 def _league(document: Document, costs: Document, pictures: Sequence[Path]) -> Section:
     targets = document["targets"]
-    header = [
-        "model", "gate", "export", "not distinguishable from the first",
-        *(f"{_words(name)}: R², 95 %" for name in targets),
-        "weights", "fit [s]", "row [µs]",
-    ]  # fmt: skip
-    rows = []
+    errors, squares, prices = [], [], []
     for entry in document["league"]:
+        name = entry["name"] + (" (chosen)" if entry["name"] == document["chosen"] else "")
+        figures = [entry["targets"][target] for target in targets]
+        gate = {True: "passed", False: "failed", None: "not asked"}[entry["gate_passed"]]
+        first = "no" if entry["distinguishable_from_first"] else "yes"
+        export = "yes" if entry["exportable"] else "no"
+        errors.append([name, gate, export, first, *map(_error, figures)])
+        squares.append([name, *(show_r_squared(figure["r2"]) for figure in figures)])
         cost = costs.get(entry["name"], {})
-        rows.append(
+        prices.append(
             [
-                entry["name"] + (" (chosen)" if entry["name"] == document["chosen"] else ""),
-                {True: "passed", False: "failed", None: "not asked"}[entry["gate_passed"]],
-                "yes" if entry["exportable"] else "no",
-                "" if entry["distinguishable_from_first"] else "same",
-                *(_figures(entry["targets"][name]) for name in targets),
-                "" if entry["parameters"] is None else f"{entry['parameters']:,}",
+                name,
+                "-" if entry["parameters"] is None else f"{entry['parameters']:,}",
                 _number(cost.get("fit_seconds")),
-                _number(cost.get("network_row") or cost.get("row")),
+                *(_number(cost.get(key)) for key in ("row", "batch")),
+                *(_number(cost.get(f"network_{key}")) for key in ("row", "batch")),
             ]
         )
-    chosen = document["chosen"] or "none: no model that can be exported passes the gate"
-    gap = document["gap"]
-    paragraphs = [f"Chosen: {chosen} ({document['rule']})."]
-    if gap > 1.0:
-        paragraphs.append(
-            f"Its validation error is {gap:.2f} times that of {document['best_overall']}, the "
-            "best overall."
-        )
-    paragraphs.append(_extent(document["extent"]))
+    words = [_words(name) for name in targets]
     paper = document["paper"]
     caption = (
-        f"Best validation error first; intervals: {document['interval']}. Published for "
-        f"{_words(paper['target'])}: R² {paper['r2']}, 95 % within "
-        f"{paper['relative_error_95']:.1%} from {paper['runs']:,} runs."
+        f"95 % relative error (95 % interval, bootstrap over test rows), best validation error "
+        f"first. Published for {_words(paper['target'])}: 95 % within "
+        f"{paper['relative_error_95']:.1%}, R² {paper['r2']}, from {paper['runs']:,} runs."
     )
-    return Section(
-        "League table",
-        paragraphs,
-        [Table(header, rows, caption)],
-        _pictures(pictures, "league"),
-        document["remarks"],
-    )
+    tables = [
+        Table(("model", "gate", "export", "level with the first", *words), errors, caption),
+        Table(("model", *words), squares, "R², cut to five places"),
+        Table(
+            ("model", "weights", "fit [s]", "one row [µs]", "batch, a row [µs]",
+             "exported, one row [µs]", "exported, batch, a row [µs]"),
+            prices, "Costs on this machine",
+        ),
+    ]  # fmt: skip
+    chosen = document["chosen"] or "none: no model that can be exported passes the gate"
+    paragraphs = [f"Chosen: {chosen} ({document['rule']})."]
+    if document["gap"] > 1.0:
+        paragraphs.append(
+            f"Its validation error is {document['gap']:.2f} times that of "
+            f"{document['best_overall']}, the best overall."
+        )
+    paragraphs.append(_extent(document["extent"]))
+    shown = _pictures(pictures, "league")
+    return Section("League table", paragraphs, tables, shown, document["remarks"])
 
 
 def _extent(extent: Document) -> str:
@@ -128,12 +133,9 @@ def _extent(extent: Document) -> str:
     )
 
 
-def _figures(entry: Document) -> str:
+def _error(entry: Document) -> str:
     low, high = (show_share(value) for value in entry["relative_error_95_interval"])
-    return (
-        f"{show_r_squared(entry['r2'])}, {show_share(entry['relative_error_95'])} "
-        f"({low.removesuffix('%')}-{high})"
-    )
+    return f"{show_share(entry['relative_error_95'])} ({low.removesuffix('%')}\u2011{high})"
 
 
 def _marks(document: Document) -> Section:
@@ -168,13 +170,14 @@ def _gate(document: Document, pictures: Sequence[Path]) -> Section | None:
     if not document["gate"]:
         return None
     points = [
-        f"{name}: {'passed' if gate['passed'] else '; '.join(gate['reasons'])}"
+        f"{name}: {_reasons(gate['reasons'])}"
         for name, gate in document["gate"].items()
+        if not gate["passed"]
     ]
     first = document["chosen"] or document["best_exportable"]
     rows = [
         [
-            check["name"],
+            _words(check["name"]),
             check["says"],
             f"{check['asked']:,}" if check["asked"] else check.get("not_asked", ""),
             f"{check['broken']:,}" if check["asked"] else "",
@@ -190,6 +193,12 @@ def _gate(document: Document, pictures: Sequence[Path]) -> Section | None:
         _pictures(pictures, "gate"),
         points,
     )  # fmt: skip
+
+
+def _reasons(reasons: Sequence[str]) -> str:
+    left = len(reasons) - _REASONS
+    more = f"; and {left} more" if left > 0 else ""
+    return "; ".join(_words(reason) for reason in reasons[:_REASONS]) + more
 
 
 def _learning(document: Document, pictures: Sequence[Path]) -> Section:

@@ -148,23 +148,27 @@ def _draw(out: Path, found: Comparison, document: Mapping[str, Any]) -> list[Pat
 def outcome(found: Comparison, out: Path) -> TrainOutcome:
     """Give what the screen shows of a comparison."""
     league = found.league
-    targets, paper = league["targets"], league["paper"]
-    header = ["model", "gate", *(f"{name.replace('_', ' ')}: R², 95 %" for name in targets)]
+    paper = league["paper"]
+    first = _HEADLINE if _HEADLINE in league["targets"] else league["targets"][0]
+    others = [name for name in league["targets"] if name != first]
+    shown = [name.replace("_", " ") for name in (first, *others)]
+    header = ["model", "gate", f"{shown[0]}: R²", *(f"{name}: 95 %" for name in shown)]
     rows = []
     for entry in league["league"]:
-        cells = [
-            f"{show_r_squared(figures['r2'])}, {show_share(figures['relative_error_95'])}"
-            for figures in entry["targets"].values()
-        ]
         mark = " *" if entry["name"] == league["chosen"] else ""
         gate = {True: "passed", False: "failed", None: "-"}[entry["gate_passed"]]
-        if not entry["exportable"]:
-            gate += ", no export"
-        rows.append([entry["name"] + mark, gate, *cells])
-    mark = f"{paper['r2']:.4f}, {paper['relative_error_95']:.1%}"
-    rows.append(
-        ["paper, 10,000 runs", "", *(mark if t == paper["target"] else "" for t in targets)]
-    )
+        figures = entry["targets"]
+        rows.append(
+            [
+                entry["name"] + mark,
+                gate if entry["exportable"] else f"{gate}, no export",
+                show_r_squared(figures[first]["r2"]),
+                *(show_share(figures[name]["relative_error_95"]) for name in (first, *others)),
+            ]
+        )
+    if paper["target"] == first:
+        figures = [f"{paper['r2']:.4f}", f"{paper['relative_error_95']:.1%}"]
+        rows.append([f"paper, {paper['runs']:,} runs", "", *figures, *("" for _ in others)])
     title = f"{league['test_rows']:,} test rows never trained on"
     document = {**comparison_document(found), "out": str(out)}
     return TrainOutcome(document, title, header, rows, _lines(found, out))
