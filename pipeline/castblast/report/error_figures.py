@@ -123,7 +123,7 @@ def draw_shifts(path: Path, shifts: Mapping[str, Document]) -> Path:
     plain_log_ticks(axis.xaxis)
     axis.set_yticks(range(len(tests)), tests, fontsize=8)
     axis.set_ylim(len(tests) - 0.4, -0.6)
-    figure.suptitle("Rows unlike those trained on; open: such rows were seen, filled: they were not",
+    figure.suptitle("Rows unlike those trained on; open: such rows were seen, filled: not",
                     fontsize=11)  # fmt: skip
     axis.set_xlabel("geometric mean of the 95 % relative errors [%]")
     figure.legend(loc="outside lower center", ncols=3)

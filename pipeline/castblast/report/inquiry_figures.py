@@ -77,7 +77,8 @@ def _draw_indices(axis: Any, report: Document, target: str, order: Sequence[str]
             axis.plot(
                 [entry[model][kind] for _, entry in checked],
                 [k + shift for k, _ in checked],
-                "D", markersize=size, color=face, linestyle="none",
+                "D", markersize=size, color=face, markeredgecolor="black", markeredgewidth=0.6,
+                linestyle="none",
                 label=f"{model}, {report['physics']['rows']:,} rows" if kind == "total" else None,
             )  # fmt: skip
     axis.set_title(words(target), fontsize=9)

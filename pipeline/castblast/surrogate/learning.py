@@ -247,10 +247,18 @@ def _fit(rows: Floats, log_errors: Floats, start: Floats | None = None) -> Float
 
     middle = float(np.exp(np.mean(np.log(rows))))
 
+    def parts(p: Floats) -> tuple[Floats, Floats]:
+        # p: floor as a share of the least error, logarithm of the fall at the middle, exponent
+        fall = np.exp(p[1]) * (rows / middle) ** -p[2]
+        return p[0] * least + fall, fall
+
     def residuals(p: Floats) -> Floats:
-        # floor share of the least error, logarithm of the fall at the middle, exponent
-        law = p[0] * least + np.exp(p[1]) * (rows / middle) ** -p[2]
-        return np.asarray(np.log(law) - log_errors)
+        return np.asarray(np.log(parts(p)[0]) - log_errors)
+
+    def slopes(p: Floats) -> Floats:
+        law, fall = parts(p)
+        each = (np.full_like(law, least), fall, -fall * np.log(rows / middle))
+        return np.stack(each, axis=1) / law[:, None]
 
     least = float(np.exp(log_errors.min()))
     guesses = [np.array([share, float(np.median(log_errors)), 0.7]) for share in (0.05, 0.5, 0.9)]
@@ -259,6 +267,9 @@ def _fit(rows: Floats, log_errors: Floats, start: Floats | None = None) -> Float
         fall = np.log(max(scale, 1e-300)) - exponent * np.log(middle)
         guesses = [np.array([min(max(floor / least, 1e-9), 1.9), max(fall, -40.0), exponent])]
     bounds = ([0.0, -50.0, 0.0], [2.0, 10.0, 4.0])
-    runs = [least_squares(residuals, np.clip(g, *bounds), bounds=bounds) for g in guesses]
+    runs = [
+        least_squares(residuals, np.clip(guess, *bounds), jac=slopes, bounds=bounds)
+        for guess in guesses
+    ]
     share, fall, exponent = min(runs, key=lambda run: float(run.cost)).x.tolist()
     return np.array([share * least, np.exp(fall) * middle**exponent, exponent])

@@ -42,7 +42,7 @@ Possible: TypeAlias = Callable[[Floats], NDArray[np.bool_]]
 #: Name of the explosive among the inputs.
 EXPLOSIVE = "explosive"
 _MOST_TRIES = 1000
-_RESAMPLES = 200
+_RESAMPLES = 100
 
 
 class Index(NamedTuple):
