@@ -164,6 +164,8 @@ def test_inputs_outside_the_training_data_are_named(network: Path) -> None:
     assert answer["domain_faults"][0].startswith("burden = 8 m: trained on 1.5")
     joint = predict({"burden": 2.0, "bench_height": 20.0, "charge_length": 12.0}, "anfo", network)
     assert joint["out_of_domain"] == ["bench_height", "charge_length", "burden"]
+    assert (answer["domain"], answer["domain_kinds"]) == ("outside", ["box"])
+    assert joint["domain_kinds"] == ["rule"]
 
 
 def test_inputs_that_the_network_cannot_see_are_named(network: Path) -> None:
@@ -173,6 +175,7 @@ def test_inputs_that_the_network_cannot_see_are_named(network: Path) -> None:
     answer = predict({"poisson_ratio": 0.3, "spacing": 4.0}, "anfo", network)
     assert answer["out_of_domain"] == ["poisson_ratio", "spacing"]
     assert "has no effect in this network, trained at 0.25" in answer["domain_faults"][0]
+    assert answer["domain_kinds"] == ["unseen", "unseen"]
 
 
 def test_prediction_from_quantities(network: Path) -> None:
@@ -210,8 +213,9 @@ def test_csv_of_designs(network: Path, tmp_path: Path) -> None:
     )
     lines = table.text.splitlines()
     assert len(lines) == 3
-    assert lines[1].split(",")[-2:] == ["yes", ""]
-    assert lines[2].split(",")[-2] == "no"
+    score = table.rows[0]["density_score"]
+    assert lines[1].split(",")[-4:] == ["yes", "", "inside", f"{score:.4g}"]
+    assert lines[2].split(",")[-4:-1] == ["no", "burden", "outside"]
 
 
 def test_faults_of_a_csv_come_all_at_once_with_their_lines(network: Path, tmp_path: Path) -> None:

@@ -36,8 +36,9 @@ def predict(
 ) -> Mapping[str, Any]:
     """Predict equilibrium pressure, hole expansion, crushed zone and burden velocity.
 
-    Inputs that are not given take their defaults. Every value comes with its 95 % band, and the
-    inputs that lie outside the training data are named.
+    Inputs that are not given take their defaults. Every value comes with its 95 % band. A design
+    outside the training data, or unusual among them, is called so, and the inputs at fault are
+    named.
     """
     from castblast.specs.case import split_assignments
     from castblast.stages.predict import predict_design

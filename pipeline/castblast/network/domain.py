@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from castblast.network.record import Column, Network
 from castblast.network.terms import Floats
 
-#: What refuses a row: range of one input, rule between inputs, joint density.
-DomainKind = Literal["box", "rule", "density"]
+#: What refuses a row: range of one input, rule between inputs, joint density; or an input that the
+#: network cannot see was given.
+DomainKind = Literal["box", "rule", "density", "unseen"]
 #: Inputs whose free choice would lower the score by this share of the best such choice are named.
 _BLAME = 0.5
 
@@ -22,7 +23,7 @@ class DomainViolation(NamedTuple):
 
     inputs: tuple[str, ...]
     message: str
-    kind: DomainKind = "box"
+    kind: DomainKind
 
 
 def scale_columns(values: Floats, columns: tuple[Column, ...]) -> Floats:
@@ -124,8 +125,8 @@ def _density_violation(
     )
     values = ", ".join(f"{name} = {shown[name]}" for name in named)
     message = (
-        f"{values}: unusual together, score {score:.3g} where {network.density.level:.2%} of "
-        "such rows stay below 1"
+        f"{values}: unusual {'together' if len(named) > 1 else 'beside the other inputs'}, "
+        f"score {score:.3g} where {network.density.level:.1%} of the training designs stay below 1"
     )
     return [DomainViolation(named, message, "density")]
 

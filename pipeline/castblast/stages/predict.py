@@ -6,17 +6,31 @@ Imports NumPy and light modules only, so that the command line answers in well u
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
 
 from castblast.errors import SpecError, nearest_name
 from castblast.export.json_file import read_network
-from castblast.network import DomainViolation, Network, domain_violations, evaluate
+from castblast.network import (
+    DomainViolation,
+    Floats,
+    Network,
+    RowPredictions,
+    domain_violations,
+    explosive_index,
+    member_spread,
+    predict_rows,
+)
 from castblast.resources import resource
 from castblast.variables import INPUT_NAMES, STEMMING_RATIO, VARIABLES
 
+#: Green, amber, red: in the domain; every value and rule kept but unusual together; beyond them.
+Domain = Literal["inside", "unusual", "outside"]
 #: The network that comes with castblast.
 CHOSEN_NETWORK = "models/chosen/network.json"
 
@@ -59,8 +73,10 @@ def predict(
     -------
     dict
         Every output by name [SI]; ``bands`` (lower, upper and relative half-width per output),
-        ``display``, ``inputs`` used, ``in_domain``, ``out_of_domain`` (names) and
-        ``domain_faults`` (one line each).
+        ``spread`` of the members if there are any, ``display``, ``inputs`` used. Then
+        ``in_domain``; ``domain``: inside, unusual (only the joint density objects) or outside;
+        ``out_of_domain`` (names), ``domain_faults`` and ``domain_kinds`` (one each);
+        ``density_score``, at most 1 inside, None where the network has none.
 
     Raises
     ------
@@ -70,23 +86,53 @@ def predict(
     model = network if isinstance(network, Network) else load_network(network)
     inputs = complete_inputs(values, model)
     violations = domain_violations(model, inputs) + _unused(values, inputs, model)
-    outputs = {name: float(v) for name, v in evaluate(model, inputs, explosive).items()}
-    bands = {}
-    for column in model.outputs:
-        value, half = outputs[column.name], column.relative_band
-        low, high = sorted((value * (1.0 - half), value * (1.0 + half)))
-        bands[column.name] = {"lower": low, "upper": high, "relative": half}
+    numeric = np.array([[inputs[name] for name in model.input_names]])
+    index = np.array([explosive_index(model, explosive)], dtype=np.int64)
+    row = predict_rows(model, numeric, index)
+    outputs = dict(zip(model.output_names, row.values[0].tolist(), strict=True))
+    score = float(row.score[0])
     return {
         "explosive": explosive,
         **outputs,
-        "bands": bands,
+        "bands": _bands(model, row),
+        **_spread(model, numeric, index),
         "display": {column.name: column.show(outputs[column.name]) for column in model.outputs},
         "inputs": inputs,
         "in_domain": not violations,
+        "domain": _verdict(violations),
         "out_of_domain": list(dict.fromkeys(n for v in violations for n in v.inputs)),
         "domain_faults": [violation.message for violation in violations],
+        "domain_kinds": [violation.kind for violation in violations],
+        "density_score": score if math.isfinite(score) else None,
         "model": _identity(model),
     }
+
+
+def _bands(model: Network, row: RowPredictions) -> dict[str, dict[str, float]]:
+    """Ends of the 95 % bands of one row."""
+    return {
+        column.name: {
+            "lower": float(row.lower[0, j]),
+            "upper": float(row.upper[0, j]),
+            "relative": column.relative_band,
+        }
+        for j, column in enumerate(model.outputs)
+    }
+
+
+def _spread(model: Network, numeric: Floats, index: NDArray[np.int64]) -> dict[str, Any]:
+    """Relative spread of the members of an ensemble, if the network has any."""
+    if not model.members:
+        return {}
+    spread = member_spread(model, numeric, index)[0]
+    return {"spread": dict(zip(model.output_names, spread.tolist(), strict=True))}
+
+
+def _verdict(violations: Sequence[DomainViolation]) -> Domain:
+    """Inside; unusual where only the joint density objects; else outside."""
+    if not violations:
+        return "inside"
+    return "unusual" if {violation.kind for violation in violations} == {"density"} else "outside"
 
 
 def predict_design(
@@ -100,7 +146,11 @@ def predict_design(
     rows = [_row(model, name, document) for name in model.output_names]
     shown = ", ".join(f"{c.name} {c.show(document['inputs'][c.name])}" for c in model.inputs)
     remarks = [f"inputs: {shown}"]
-    remarks += [f"outside the training data: {line}" for line in document["domain_faults"]]
+    lead = "unusual among" if document["domain"] == "unusual" else "outside"
+    remarks += [f"{lead} the training data: {line}" for line in document["domain_faults"]]
+    score = document["density_score"]
+    if score is not None and document["in_domain"]:
+        remarks.append(f"inside the training data: density score {score:.2f}, the limit is 1")
     return Prediction(document, f"{explosive}, {document['model']['name']}", rows, remarks)
 
 
@@ -113,8 +163,10 @@ def _row(model: Network, name: str, document: Mapping[str, Any]) -> tuple[str, s
     # One figure more than the band resolves.
     digits = max(3, min(6, 1 - math.floor(math.log10(max(column.relative_band, 1e-6))) + 1))
     low_high = f"{low:.{digits}g} to {high:.{digits}g}"
-    if not document["in_domain"]:
+    if document["domain"] == "outside":
         low_high = "unknown: outside the training data"
+    elif document["domain"] == "unusual":
+        low_high += " (unusual design)"
     return (name.replace("_", " "), f"{value:.{digits}g}", low_high, variable.shown_unit)
 
 
@@ -200,7 +252,7 @@ def _unused(
         variable = VARIABLES[name]
         trained = "" if expected is None else f", trained at {variable.show(expected)}"
         message = f"{name} = {variable.show(value)}: has no effect in this network{trained}"
-        violations.append(DomainViolation((name,), message))
+        violations.append(DomainViolation((name,), message, "unseen"))
     return violations
 
 

@@ -123,12 +123,15 @@ def _csv_text(documents: Sequence[Mapping[str, Any]], model: Network) -> str:
     bands = [f"{c.name} 95 % band [%]" for c in model.outputs]
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(["explosive", *heads, *bands, "in_domain", "out_of_domain"])
+    writer.writerow(["explosive", *heads, *bands, "in_domain", "out_of_domain", "domain",
+                     "density_score"])  # fmt: skip
     for document in documents:
         values = {**document["inputs"], **document}
         cells = [f"{values[c.name] * VARIABLES[c.name].display_factor:.8g}" for c in columns]
         half = [f"{100.0 * c.relative_band:.3g}" for c in model.outputs]
         inside = "yes" if document["in_domain"] else "no"
         outside = " ".join(document["out_of_domain"])
-        writer.writerow([document["explosive"], *cells, *half, inside, outside])
+        score = "" if document["density_score"] is None else f"{document['density_score']:.4g}"
+        verdict = [inside, outside, document["domain"], score]
+        writer.writerow([document["explosive"], *cells, *half, *verdict])
     return buffer.getvalue()
