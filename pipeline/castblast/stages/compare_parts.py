@@ -138,4 +138,4 @@ def open_domain(dataset: Path) -> Any:
     from castblast.dataset.store import open_dataset
     from castblast.surrogate.domain import dataset_domain
 
-    return dataset_domain(open_dataset(dataset), str(dataset))
+    return dataset_domain(open_dataset(dataset), dataset.name)
