@@ -64,7 +64,7 @@ def choose_batch(
         squared = np.sum((points[near] - points[best]) ** 2, axis=1)
         # As the variance of a Gaussian process with one observation: 0 there, whole far away.
         left[near] *= -np.expm1(-squared / length**2)
-        left[best] = -1.0
+        left[chosen[: place + 1]] = -1.0
     return chosen
 
 
