@@ -7,7 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from castblast.muckpile.bench import Bench, assign_blocks, block_shape
-from castblast.muckpile.neighbours import list_pairs, make_grid, sort_by_cell
+from castblast.muckpile.neighbours import make_grid, sort_by_cell
+from castblast.muckpile.pair_search import list_pairs
+from castblast.muckpile.paths import lay_out
 
 
 def listed_pairs(position, velocity, radius, skin, horizon, held=None):
@@ -19,11 +21,9 @@ def listed_pairs(position, velocity, radius, skin, horizon, held=None):
     grid = make_grid(middle.min(axis=0), middle.max(axis=0), reach, len(radius))
     path = np.column_stack([position, velocity]).astype(np.float32)
     order, cell_start, slab = sort_by_cell(path, grid, 0.5 * horizon)
-    place = np.column_stack([position, radius])[order]
     held = np.zeros(0, dtype=bool) if held is None else held[order]
-    start, partner = list_pairs(
-        place, path[order], held, cell_start, slab, grid, skin, horizon, guess=0.5
-    )
+    paths = lay_out(path, radius, order, skin)
+    start, partner = list_pairs(paths, held, cell_start, slab, grid, horizon, guess=0.5)
     n = len(radius)
     first = np.repeat(np.arange(n), np.diff(start))
     slab_of = np.searchsorted(slab, np.arange(n), side="right")

@@ -13,25 +13,29 @@ contact exerts on the *second* partner, the first receives their opposites; the 
 in the middle of the overlap, so that forces and moments conserve angular momentum exactly.
 
 A row of contact memory holds F_s (3), M (3), k_n and 2 sqrt(m_c k_n): one cache line in double
-precision, half of one in single. It is written when the contact closes; all arithmetic is done in
-double precision, whatever the rows are stored in.
+precision, half of one in single. It is written when the contact closes. What a contact does in a
+step is in `castblast.muckpile.contact_step`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import IntEnum
 from math import pi, sqrt
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import DTypeLike
 
 from castblast.kernel import inline_kernel
-from castblast.muckpile.particles import FloatArray, RealArray
+from castblast.muckpile.particles import RealArray
 
 Vector: TypeAlias = tuple[float, float, float]
 
 #: Words of one row of contact memory.
 ROW = 8
-#: Stands for zero in a denominator; its square root times any force is finite.
-_TINY = 1e-200
+#: Stands for zero in a denominator, in single precision as well.
+_TINY = 1e-30
 
 
 class DashpotMode(IntEnum):
@@ -94,6 +98,8 @@ class Constants(NamedTuple):
     no_tension, slip_cut : bool
         The two rules of the dashpots.
     cap_on_total : bool
+    zero, half, one, tiny : float
+        Numbers of the law in its working precision; a plain 0.5 would turn all into double.
     """
 
     modulus: float
@@ -106,23 +112,32 @@ class Constants(NamedTuple):
     slip_cut: bool
     density: float
     cap_on_total: bool
+    zero: float
+    half: float
+    one: float
+    tiny: float
 
 
-def law_constants(law: ContactLaw) -> Constants:
-    """Prepare `law` for kernels."""
+def law_constants(law: ContactLaw, real: DTypeLike = np.float64) -> Constants:
+    """Prepare `law` for kernels that work in the precision `real`."""
+    kind: Callable[[float], Any] = float if np.dtype(real) == np.float64 else np.float32
     shear_ratio = 1.0 / float(law.stiffness_ratio)
     mode = int(law.dashpot_mode)
     return Constants(
-        float(law.effective_modulus),
-        shear_ratio,
-        float(law.friction),
-        float(law.rolling_friction),
-        float(law.damping_normal),
-        float(law.damping_shear) * sqrt(shear_ratio),
+        kind(law.effective_modulus),
+        kind(shear_ratio),
+        kind(law.friction),
+        kind(law.rolling_friction),
+        kind(law.damping_normal),
+        kind(float(law.damping_shear) * sqrt(shear_ratio)),
         mode in (DashpotMode.NO_TENSION, DashpotMode.NO_TENSION_SLIP_CUT),
         mode in (DashpotMode.SLIP_CUT, DashpotMode.NO_TENSION_SLIP_CUT),
-        float(law.density),
+        kind(law.density),
         bool(law.cap_on_total),
+        kind(0.0),
+        kind(0.5),
+        kind(1.0),
+        kind(_TINY),
     )
 
 
@@ -182,188 +197,6 @@ def close_contact(
     memory[p, 7] = 2.0 * sqrt(mass * stiffness)
     if len(dash) > 0:
         dash[p, 0], dash[p, 1], dash[p, 2] = 0.0, 0.0, 0.0
-
-
-@inline_kernel
-def contact_force(
-    memory: RealArray,
-    dash: RealArray,
-    p: int,
-    law: Constants,
-    friction: float,
-    rolling_friction: float,
-    normal: Vector,
-    overlap: float,
-    effective_radius: float,
-    slide: Vector,
-    roll: Vector,
-    spin: float,
-    step: float,
-    work: FloatArray,
-    w: int,
-) -> tuple[Vector, Vector]:
-    """Advance contact `p` by a step: update its memory, return what it does to the second partner.
-
-    Parameters
-    ----------
-    memory : array (p, 8)
-        Rows of contact memory; F_s and M are updated in place.
-    dash : array (p, 3) or (0, 3) [N]
-        Dashpot force of the last step, for the ledger only; empty: no ledger is kept.
-    law : Constants
-    friction, rolling_friction : float [-]
-        Of this contact (walls may have their own).
-    normal : 3 floats
-        Unit vector from the first to the second partner.
-    overlap : float [m]
-        Positive.
-    effective_radius : float [m]
-        Rbar = R1 R2/(R1 + R2); R against a wall.
-    slide : 3 floats [m s-1]
-        Velocity of the second relative to the first at the contact point.
-    roll : 3 floats [rad s-1]
-        Spin of the second relative to the first.
-    spin : float [rad s-1]
-        Mean spin of both about the normal: turns the contact plane with its partners.
-    step : float [s]
-    work : array (k, 3) [J]
-        Row `w` collects the work of slip, rolling slip and dashpots.
-
-    Returns
-    -------
-    3 floats [N], 3 floats [N m]
-        Force and rolling moment on the second partner.
-
-    Notes
-    -----
-    The shear force is carried into the new contact plane without change of length, then grows by
-    -k_s du_s and is cut back to mu F_n, F_n being the force of the spring alone. The moment does
-    the same with the bending part of the relative rotation.
-    """
-    nx, ny, nz = normal
-    kn = memory[p, 6]
-    ks = kn * law.shear_ratio
-    fn = kn * overlap
-    vn = slide[0] * nx + slide[1] * ny + slide[2] * nz
-    vx, vy, vz = slide[0] - vn * nx, slide[1] - vn * ny, slide[2] - vn * nz
-
-    # vn < 0 while the partners approach.
-    push = -law.damping_normal * memory[p, 7] * vn
-    if law.no_tension:
-        push = max(push, -fn)
-    drag = law.damping_shear * memory[p, 7]
-    grip, hidden = fn, 0.0
-    if law.cap_on_total:
-        grip, hidden = max(fn + push, 0.0), drag
-
-    turned = _follow(memory[p, 0], memory[p, 1], memory[p, 2], normal, spin * step)
-    force, cut, length = _grow(turned, (vx, vy, vz), ks, step, friction * grip, hidden)
-    fx, fy, fz = force
-    memory[p, 0], memory[p, 1], memory[p, 2] = fx, fy, fz
-    # At the limit is slipping: a frictionless contact slips before its spring has grown.
-    if law.slip_cut and not law.cap_on_total:
-        drag = drag if length < friction * grip else 0.0
-
-    wn = roll[0] * nx + roll[1] * ny + roll[2] * nz
-    bend = (roll[0] - wn * nx, roll[1] - wn * ny, roll[2] - wn * nz)
-    kr = ks * effective_radius * effective_radius
-    limit = rolling_friction * effective_radius * grip
-    bent = _follow(memory[p, 3], memory[p, 4], memory[p, 5], normal, spin * step)
-    moment, roll_cut, roll_length = _grow(bent, bend, kr, step, limit, 0.0)
-    memory[p, 3], memory[p, 4], memory[p, 5] = moment
-
-    dx, dy, dz = push * nx - drag * vx, push * ny - drag * vy, push * nz - drag * vz
-    if len(dash) > 0:
-        # Half of the work of the force before and half of the force now, over the same path: the
-        # form in which kick-drift-kick integration exchanges energy.
-        held = (fx - hidden * vx, fy - hidden * vy, fz - hidden * vz)
-        work[w, 0] += _slip_work(turned, held, cut, length, ks)
-        work[w, 1] += _slip_work(bent, moment, roll_cut, roll_length, kr)
-        work[w, 2] -= (
-            0.5
-            * step
-            * (
-                (dash[p, 0] + dx) * slide[0]
-                + (dash[p, 1] + dy) * slide[1]
-                + (dash[p, 2] + dz) * slide[2]
-            )
-        )
-        dash[p, 0], dash[p, 1], dash[p, 2] = dx, dy, dz
-    return (fn * nx + fx + dx, fn * ny + fy + dy, fn * nz + fz + dz), moment
-
-
-@inline_kernel
-def open_contact(
-    memory: RealArray,
-    dash: RealArray,
-    p: int,
-    shear_ratio: float,
-    effective_radius: float,
-    slide: Vector,
-    step: float,
-    work: FloatArray,
-    w: int,
-) -> None:
-    """Close the books of a contact that has just opened.
-
-    The springs hold almost nothing then, because their limits fell to zero with the normal force;
-    what the last step left in them counts as slip. Arguments as in `contact_force`.
-    """
-    if len(dash) > 0:
-        ks = memory[p, 6] * shear_ratio
-        work[w, 0] += (memory[p, 0] ** 2 + memory[p, 1] ** 2 + memory[p, 2] ** 2) / (2.0 * ks)
-        work[w, 1] += (memory[p, 3] ** 2 + memory[p, 4] ** 2 + memory[p, 5] ** 2) / (
-            2.0 * ks * effective_radius * effective_radius
-        )
-        work[w, 2] -= (
-            0.5 * step * (dash[p, 0] * slide[0] + dash[p, 1] * slide[1] + dash[p, 2] * slide[2])
-        )
-
-
-@inline_kernel
-def _grow(
-    force: Vector, rate: Vector, stiffness: float, step: float, limit: float, drag: float
-) -> tuple[Vector, float, float]:
-    """Let a spring force grow by -stiffness rate dt up to `limit`.
-
-    With a `drag` the limit holds for the sum of the spring and a dashpot -drag rate. Returns the
-    force of the spring, its share that is left (below 1: it slips), and its length before [N].
-    No branch: whether a contact slips cannot be predicted, and a wrong guess costs more.
-    """
-    grown = stiffness * step + drag
-    x, y, z = force[0] - grown * rate[0], force[1] - grown * rate[1], force[2] - grown * rate[2]
-    length = sqrt(x * x + y * y + z * z)
-    cut = min(1.0, limit / max(length, _TINY))
-    left = (cut * x + drag * rate[0], cut * y + drag * rate[1], cut * z + drag * rate[2])
-    return left, cut, length
-
-
-@inline_kernel
-def _slip_work(before: Vector, left: Vector, cut: float, length: float, stiffness: float) -> float:
-    """Work [J] of a slip: mean of the force before and after, times the path not taken up."""
-    if cut >= 1.0 or length == 0.0:
-        return 0.0
-    mean = before[0] * left[0] + before[1] * left[1] + before[2] * left[2]
-    limit = cut * length
-    mean = 0.5 * (mean / limit + limit) if limit > 0.0 else 0.0
-    return mean * (length - limit) / stiffness
-
-
-@inline_kernel
-def _follow(x: float, y: float, z: float, normal: Vector, angle: float) -> Vector:
-    """Carry a tangential vector into the plane of `normal` and turn it by a small `angle`."""
-    nx, ny, nz = normal
-    square = x * x + y * y + z * z
-    along = x * nx + y * ny + z * nz
-    x -= along * nx
-    y -= along * ny
-    z -= along * nz
-    tx = x + angle * (ny * z - nz * y)
-    ty = y + angle * (nz * x - nx * z)
-    tz = z + angle * (nx * y - ny * x)
-    # Nothing stays nothing.
-    scale = sqrt(square / max(tx * tx + ty * ty + tz * tz, _TINY))
-    return tx * scale, ty * scale, tz * scale
 
 
 @inline_kernel

@@ -15,12 +15,14 @@ from __future__ import annotations
 
 import numpy as np
 from numba import prange
+from numpy.typing import NDArray
 
 from castblast.kernel import inline_kernel, lean_kernel, parallel_kernel
 from castblast.muckpile.contact import Constants
-from castblast.muckpile.forces import pair_forces, wall_forces
-from castblast.muckpile.particles import FloatArray, IntArray, RealArray
+from castblast.muckpile.pair_forces import BLOCK_NAMES, BLOCK_NUMBERS, pair_forces
+from castblast.muckpile.particles import FloatArray, Int32Array, IntArray, RealArray
 from castblast.muckpile.state import Balls, Contacts
+from castblast.muckpile.wall_forces import wall_forces
 from castblast.muckpile.walls import WallTable
 
 #: Most sweeps that run side by side; more threads than that have nothing to do.
@@ -71,7 +73,7 @@ def _drift(
     place: FloatArray,
     motion: RealArray,
     force: RealArray,
-    reference: RealArray,
+    paths: NDArray[np.float32],
     i: int,
     step: float,
     elapsed: float,
@@ -80,7 +82,7 @@ def _drift(
     off = 0.0
     for axis in range(3):
         place[i, axis] += motion[i, axis] * step
-        straight = reference[i, axis] + reference[i, axis + 3] * elapsed
+        straight = paths[axis, i] + paths[axis + 3, i] * elapsed
         off += (place[i, axis] - straight) ** 2
         force[i, axis] = 0.0
         force[i, axis + 3] = 0.0
@@ -97,17 +99,15 @@ def _do_pairs(
     step: float,
     work: FloatArray,
     w: int,
+    blocks: RealArray,
+    names: Int32Array,
+    b: int,
 ) -> None:
     """Pair forces of the balls first .. last - 1; `work` is booked in row `w`."""
-    place, motion, force = balls.place, balls.motion, balls.force
-    start, partner, memory = pairs.start, pairs.partner, pairs.memory
-    touching, dash = pairs.touching, pairs.dash
-    for i in range(first, last):
-        if start[i] < start[i + 1]:
-            pair_forces(
-                place, motion, force, partner, memory, touching, dash,
-                start[i], start[i + 1], i, law, step, work, w,
-            )  # fmt: skip
+    pair_forces(
+        balls.place, balls.motion, balls.force, pairs.start, pairs.partner, pairs.memory,
+        pairs.touching, pairs.dash, first, last, law, step, work, w, blocks, names, b,
+    )  # fmt: skip
 
 
 @lean_kernel
@@ -130,7 +130,7 @@ def _do_balls(
     A negative `pending` or a zero `step` leaves out its part. Returns the largest square [m2] of
     the way off the straight path, `elapsed` after the lists were made.
     """
-    place, motion, force, reference = balls.place, balls.motion, balls.force, balls.reference
+    place, motion, force, paths = balls.place, balls.motion, balls.force, balls.paths
     start, partner, memory = touches.start, touches.partner, touches.memory
     touching, dash = touches.touching, touches.dash
     largest = 0.0
@@ -151,7 +151,7 @@ def _do_balls(
             )  # fmt: skip
         if step > 0.0:
             _kick(motion, force, i, per_mass * step, per_inertia * step, 0.5 * gravity * step)
-            off = _drift(place, motion, force, reference, i, step, elapsed)
+            off = _drift(place, motion, force, paths, i, step, elapsed)
             # A state that is not finite counts as far off.
             if not off <= largest:
                 largest = off if off == off else np.inf
@@ -174,13 +174,16 @@ def _sweep(
     step: float,
     elapsed: float,
     work: FloatArray,
+    blocks: RealArray,
+    names: Int32Array,
+    b: int,
 ) -> float:
     """Pass over the slabs first .. last - 1; `ends`: no chunk follows, the last pairs are left."""
     largest = 0.0
     for s in range(first, last):
         here, there = slab[s], slab[s + 1]
         if pending >= 0.0 and (ends or s < last - 1):
-            _do_pairs(balls, pairs, here, there, law, pending, work, s)
+            _do_pairs(balls, pairs, here, there, law, pending, work, s, blocks, names, b)
         off = _do_balls(
             balls, touches, walls, here, there, law, gravity, pending, step, elapsed, work, s
         )
@@ -248,6 +251,8 @@ def advance(
     """
     chunks = len(chunk) - 1
     off = np.zeros(chunks)
+    blocks = np.empty(chunks * BLOCK_NUMBERS, balls.motion.dtype)
+    names = np.empty(chunks * BLOCK_NAMES, np.int32)
     ended, begun = 0, 0
     while pending < 0.0 or not (clock - built > horizon or not off.max() <= allowed * allowed):
         following = step if pending < 0.0 or ended + 1 < steps else 0.0
@@ -255,13 +260,15 @@ def advance(
             if chunks > 1:
                 for c in prange(chunks - 1):
                     s = chunk[c + 1] - 1
-                    _do_pairs(balls, pairs, slab[s], slab[s + 1], law, pending, work, s)
+                    _do_pairs(
+                        balls, pairs, slab[s], slab[s + 1], law, pending, work, s, blocks, names, c
+                    )
             ended += 1
         elapsed = clock + following - built
         for c in prange(chunks):
             off[c] = _sweep(
                 balls, pairs, touches, walls, slab, chunk[c], chunk[c + 1], c == chunks - 1,
-                law, gravity, pending, following, elapsed, work,
+                law, gravity, pending, following, elapsed, work, blocks, names, c,
             )  # fmt: skip
         if following == 0.0:
             return ended, begun, -1.0, clock
@@ -284,12 +291,14 @@ def present_forces(
 ) -> None:
     """Forces of a state as it stands: no contact is loaded any further."""
     chunks = len(chunk) - 1
+    blocks = np.empty(chunks * BLOCK_NUMBERS, balls.motion.dtype)
+    names = np.empty(chunks * BLOCK_NAMES, np.int32)
     balls.force[:] = 0.0
     for c in prange(chunks - 1):
         s = chunk[c + 1] - 1
-        _do_pairs(balls, pairs, slab[s], slab[s + 1], law, 0.0, work, s)
+        _do_pairs(balls, pairs, slab[s], slab[s + 1], law, 0.0, work, s, blocks, names, c)
     for c in prange(chunks):
         _sweep(
             balls, pairs, touches, walls, slab, chunk[c], chunk[c + 1], c == chunks - 1,
-            law, 0.0, 0.0, 0.0, 0.0, work,
+            law, 0.0, 0.0, 0.0, 0.0, work, blocks, names, c,
         )  # fmt: skip

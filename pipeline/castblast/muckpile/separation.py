@@ -11,12 +11,13 @@ from __future__ import annotations
 from math import sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from castblast.kernel import kernel
-from castblast.muckpile.neighbours import list_pairs, make_grid, sort_by_cell
+from castblast.muckpile.neighbours import make_grid, sort_by_cell
 from castblast.muckpile.outline import Outline
+from castblast.muckpile.pair_search import list_pairs
 from castblast.muckpile.particles import FloatArray, Int32Array
+from castblast.muckpile.paths import lay_out
 from castblast.muckpile.walls import Walls
 from castblast.progress import ProgressCallback, silent
 
@@ -56,13 +57,12 @@ def push_apart(
     sweeps, overlap = 0, np.inf
     while sweeps < most_sweeps and overlap > tolerance * mean:
         reach = 2.0 * float(radius.max()) + _SKIN * mean
-        paths = _resting(place)
+        rows = np.column_stack([place[:, 0:3], np.zeros_like(place[:, 0:3])])
         grid = make_grid(place[:, 0:3].min(axis=0), place[:, 0:3].max(axis=0), reach, len(place))
-        order, cell_start, slab = sort_by_cell(paths, grid)
+        order, cell_start, slab = sort_by_cell(rows, grid)
+        paths = lay_out(rows, place[:, 3], order, _SKIN * mean)
         place, identity = place[order], identity[order]
-        start, partner = list_pairs(
-            place, paths[order], _NONE_HELD, cell_start, slab, grid, _SKIN * mean, 0.0
-        )
+        start, partner = list_pairs(paths, _NONE_HELD, cell_start, slab, grid, 0.0)
         done, overlap = _sweep(
             place,
             start,
@@ -80,13 +80,6 @@ def push_apart(
     back = np.empty((len(radius), 3))
     back[identity] = place[:, 0:3]
     return back
-
-
-def _resting(place: FloatArray) -> NDArray[np.float32]:
-    """Return the straight paths (n, 6) of balls that rest, for the search of neighbours."""
-    paths = np.zeros((len(place), 6), dtype=np.float32)
-    paths[:, 0:3] = place[:, 0:3]
-    return paths
 
 
 @kernel

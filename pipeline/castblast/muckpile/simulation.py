@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 from castblast.muckpile.carry import inverse, put_aside, restore, take_rows
 from castblast.muckpile.contact import ContactLaw, damped_step_factor, law_constants
 from castblast.muckpile.dynamics import advance, cut_chunks, present_forces
-from castblast.muckpile.neighbours import Grid, list_pairs, list_walls, make_grid, sort_by_cell
+from castblast.muckpile.neighbours import Grid, make_grid, sort_by_cell
+from castblast.muckpile.pair_search import list_pairs
 from castblast.muckpile.particles import FloatArray, Int32Array, Particles, ball_mass
+from castblast.muckpile.paths import lay_out, straight_paths
 from castblast.muckpile.stability import stable_step
 from castblast.muckpile.state import PRECISIONS, Balls, Contacts, make_contacts
 from castblast.muckpile.survey import (
@@ -27,15 +29,15 @@ from castblast.muckpile.survey import (
     ContactSurvey,
     first_bad_ball,
     greatest_deviation,
-    straight_paths,
     survey_balls,
     survey_contacts,
 )
 from castblast.muckpile.threads import enough_threads
+from castblast.muckpile.wall_search import list_walls
 from castblast.muckpile.walls import Walls, wall_table
 
 #: Skin over mean diameter; measured as the fastest for balls in free flight and at rest.
-SKIN_RATIO = 0.15
+SKIN_RATIO = 0.10
 #: A ball may stray this far from the centre of a cast before its state counts as unstable [m].
 FARTHEST = 1e5
 #: Overlap over radius that only an unstable step can make: a small ball caught between large ones
@@ -102,7 +104,7 @@ class Simulation:
 
     def __post_init__(self) -> None:
         given, count = self.particles, len(self.particles.radius)
-        self._law = law_constants(self.law)
+        self._law = law_constants(self.law, PRECISIONS[self.precision])
         self._walls = wall_table(self.walls, self._law.friction, self._law.rolling_friction)
         self._factor = self.step_safety * damped_step_factor(self.law)
         if self.skin <= 0.0:
@@ -119,7 +121,7 @@ class Simulation:
             np.column_stack([given.position, given.radius]),
             motion,
             np.zeros((count, 8), dtype=real),
-            np.empty((0, 6), dtype=np.float32),
+            np.empty((7, 0), dtype=np.float32),
             np.arange(count, dtype=np.int32),
         )
         none = np.zeros(count + 1, dtype=np.int32)
@@ -326,19 +328,17 @@ class Simulation:
         real, place_of = balls.motion.dtype, inverse(order)
         held = balls.motion[:, 7] != 0.0
         held = held if held.any() else held[:0]
-        near = (balls.place, balls.reference, held)
+        near = (balls.paths, held)
         guess = 1.1 * len(self._pairs.partner) / len(order) + 4.0
 
         memory = put_aside(self._touches)
-        self._touches = make_contacts(
-            *list_walls(*near, self._walls, self.skin, life), real, ledger
-        )
+        self._touches = make_contacts(*list_walls(*near, self._walls, life), real, ledger)
         restore(self._touches, memory, order, place_of, True)
         memory = put_aside(self._pairs)
         # The old list goes before the new one comes.
         self._pairs = self._touches
         self._pairs = make_contacts(
-            *list_pairs(*near, cell_start, self._slab, grid, self.skin, life, guess), real, ledger
+            *list_pairs(*near, cell_start, self._slab, grid, life, guess), real, ledger
         )
         restore(self._pairs, memory, order, place_of, False)
 
@@ -353,14 +353,14 @@ class Simulation:
     def _sort_balls(self, life: float, reach: float) -> tuple[Int32Array, Int32Array, Grid]:
         """Bring the balls into the order of cells, for lists of this `life` [s] and `reach` [m]."""
         balls = self._balls
-        reference, lower, upper = straight_paths(balls.place, balls.motion, life)
+        rows, lower, upper = straight_paths(balls.place, balls.motion, life)
         grid = make_grid(lower, upper, reach, len(balls.place))
-        order, cell_start, self._slab = sort_by_cell(reference, grid, 0.5 * life)
+        order, cell_start, self._slab = sort_by_cell(rows, grid, 0.5 * life)
         self._balls = Balls(
             take_rows(balls.place, order),
             take_rows(balls.motion, order),
             take_rows(balls.force, order),
-            take_rows(reference, order),
+            lay_out(rows, balls.place[:, 3], order, self.skin),
             balls.identity[order],
         )
         return order, cell_start, grid

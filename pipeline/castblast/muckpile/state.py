@@ -1,9 +1,10 @@
 """What the engine works on: balls in the order of their cells, and their candidate contacts.
 
-In mixed precision, motion, forces and contact memory are stored in single precision: a contact
-then takes half a cache line and a ball 124 bytes instead of 188. Positions stay in double
-precision (a float32 at 100 m resolves 8e-6 m, a good part of the overlap of a ball at rest), and
-all arithmetic is double.
+In mixed precision, motion, forces and contact memory are held in single precision, and the law of
+a contact between balls is computed in it: a contact then takes half a cache line, twice as many go
+into a vector, and a ball takes 124 bytes instead of 188. Positions stay in double precision (a
+float32 at 100 m resolves 8e-6 m, a good part of the overlap of a ball at rest); distances and
+overlaps are differences of them, formed in double and rounded afterwards.
 """
 
 from __future__ import annotations
@@ -41,9 +42,8 @@ class Balls(NamedTuple):
         Velocity [m s-1], spin [rad s-1], mass [kg], and 1.0 where the ball is held in place.
     force : array (n, 8), real
         Force [N], moment [N m], two unused words. Meaningless where the ball is held.
-    reference : array (n, 6), float32
-        Centre and velocity when the list was built: a straight path. Search and test use this
-        same path, so that its rounding costs no contact.
+    paths : array (7, n + 16), float32
+        Straight paths from the time when the lists were made, see `castblast.muckpile.paths`.
     identity : array (n,), int32
         Index of the ball in the caller's arrays.
     """
@@ -51,7 +51,7 @@ class Balls(NamedTuple):
     place: FloatArray
     motion: RealArray
     force: RealArray
-    reference: NDArray[np.float32]
+    paths: NDArray[np.float32]
     identity: Int32Array
 
 

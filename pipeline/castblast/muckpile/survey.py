@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import prange
-from numpy.typing import NDArray
 
 from castblast.kernel import lean_kernel, parallel_kernel
 from castblast.muckpile.contact import Constants, spring_energy
@@ -111,31 +110,6 @@ def greatest_deviation(motion: RealArray) -> float:
                 square += (motion[i, axis] - middle[axis]) ** 2
             most[piece] = max(most[piece], square)
     return sqrt(most.max())
-
-
-@parallel_kernel
-def straight_paths(
-    place: FloatArray, motion: RealArray, life: float
-) -> tuple[NDArray[np.float32], FloatArray, FloatArray]:
-    """Reference paths (n, 6), and the box of their middles; resting if `life` [s] is 0."""
-    count = len(place)
-    reference = np.empty((count, 6), np.float32)
-    lower, upper = np.full((PIECES, 3), np.inf), np.full((PIECES, 3), -np.inf)
-    moving = 1.0 if life > 0.0 else 0.0
-    for piece in prange(PIECES):
-        for i in range(piece * count // PIECES, (piece + 1) * count // PIECES):
-            for axis in range(3):
-                reference[i, axis] = place[i, axis]
-                reference[i, axis + 3] = moving * motion[i, axis]
-                middle = place[i, axis] + 0.5 * life * motion[i, axis]
-                lower[piece, axis] = min(lower[piece, axis], middle)
-                upper[piece, axis] = max(upper[piece, axis], middle)
-    low, high = lower[0].copy(), upper[0].copy()
-    for piece in range(1, PIECES):
-        for axis in range(3):
-            low[axis] = min(low[axis], lower[piece, axis])
-            high[axis] = max(high[axis], upper[piece, axis])
-    return reference, low, high
 
 
 class ContactSurvey(NamedTuple):
