@@ -51,7 +51,7 @@ class Extent:
     curve_sizes : tuple of int
         Training rows of the curves.
     shifts : bool
-        Refit the chosen model without one explosive, corner or group after the other.
+        Fit the chosen spec, quickly, without one explosive, corner or group after the other.
     probe_points, dense_points : int
         Places where the simulator and the surrogates are asked for the physics gate.
     sobol_rows, checked_rows : int
@@ -336,7 +336,9 @@ def _shift_parts(
     if not extent.shifts:
         return []
     return [
-        Part(f"shifts_{fit.spec.name}", shift_part, (fit, table, dataset), _identity(fit, about))
+        Part(
+            f"shifts_{fit.spec.name}", shift_part, (fit.spec, table, dataset), _identity(fit, about)
+        )
         for fit in fits
     ]
 

@@ -252,8 +252,9 @@ def _shifts(document: Document, pictures: Sequence[Path]) -> Section | None:
     header = ("model", "kind", "never shown", "judged rows", "95 % unseen", "95 % seen", "ratio")
     return Section(
         "Beyond random splits",
-        ["The model is fitted again without one kind of rows and judged on test rows of that "
-         "kind, beside the fit that saw such rows. Errors are geometric means over the targets."],
+        ["The spec, in its quick form, is fitted without one kind of rows and judged on test rows "
+         "of that kind, beside a fit that saw such rows. Errors are geometric means over the "
+         "targets."],
         [Table(header, rows)],
         _pictures(pictures, "shifts"),
     )  # fmt: skip

@@ -20,6 +20,7 @@ from castblast.stages.jobs import Job, run_jobs
 from castblast.stages.reuse import package_hash
 
 if TYPE_CHECKING:
+    from castblast.specs.model import ModelSpec
     from castblast.surrogate.features import Table
     from castblast.surrogate.training import Fit
 
@@ -113,10 +114,12 @@ def curve_part(fit: Fit, table: Table, sizes: tuple[int, ...]) -> Any:
     return learning_curve(fit, table, sizes)
 
 
-def shift_part(fit: Fit, table: Table, dataset: Path | None) -> dict[str, Any]:
-    """Tests beyond random splits of one fit."""
+def shift_part(spec: ModelSpec, table: Table, dataset: Path | None) -> dict[str, Any]:
+    """Tests beyond random splits of one spec, in its quick form: it is fitted a dozen times."""
     from castblast.surrogate.shifts import shift_tests
+    from castblast.surrogate.training import fit_spec
 
+    fit = fit_spec(spec.quick(), table)
     return shift_tests(fit, table, None if dataset is None else open_domain(dataset))
 
 
