@@ -35,10 +35,6 @@ class Coverage(NamedTuple):
     upper: float
     rows: int
 
-    def holds(self, level: float = LEVEL) -> bool:
-        """Whether these rows do not speak against the level, or speak for more."""
-        return self.upper >= level
-
 
 def conformal_band(truth: Floats, predicted: Floats, level: float = LEVEL) -> Floats:
     """Split-conformal band relative to the prediction, per target.
@@ -101,3 +97,20 @@ def band_coverage(truth: Floats, predicted: Floats, band: Floats) -> list[Covera
         ends = binomtest(count, rows).proportion_ci(LEVEL, method="exact")
         found.append(Coverage(count / rows, float(ends.low), float(ends.high), rows))
     return found
+
+
+def expected_coverage(
+    calibration_rows: int, test_rows: int, level: float = LEVEL
+) -> tuple[float, float]:
+    """Central 95 % of the shares that a sound band may show on test rows.
+
+    The band is only right on average over the draw of its calibration rows: with rank r of n, the
+    coverage of one band is Beta(r, n + 1 - r) (Vovk 2012, Conditional validity of inductive
+    conformal predictors, Proc. ACML 25), and its test rows are binomial on top. A share outside
+    these ends speaks against the rows being of one distribution, not one outside `level` alone.
+    """
+    from scipy.stats import betabinom
+
+    rank = math.ceil((calibration_rows + 1) * level)
+    shares = betabinom(test_rows, rank, calibration_rows + 1 - rank).ppf([0.025, 0.975])
+    return float(shares[0]) / test_rows, float(shares[1]) / test_rows
