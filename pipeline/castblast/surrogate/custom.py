@@ -95,15 +95,14 @@ class CustomModel(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         function = load_factory(self.factory)
         offered = dict(zip(_OFFERED, (inputs, outputs, self.random_state), strict=True))
         arguments = {**_taken(function, offered), **(self.options or {})}
-        try:
-            model = function(**arguments)
-        except Exception as fault:
-            message = f"{self.factory}: fails with options {dict(self.options or {})}: {fault}"
-            raise SpecError(message) from fault
+        model = self._call(function, arguments)
         if _may_be_torch(model):
             from castblast.surrogate import torch_mlp
 
             if torch_mlp.is_module(model):
+                # Once more, now that it is known whose random numbers its weights come from.
+                with torch_mlp.determined(self.random_state):
+                    model = self._call(function, arguments)
                 schedule = torch_mlp.Schedule(**_numbers(self.training or {}))
                 return torch_mlp.TorchRegressor(model, schedule, self.random_state, self.watch)
         missing = [name for name in ("fit", "predict") if not callable(getattr(model, name, None))]
@@ -114,6 +113,13 @@ class CustomModel(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             )
             raise SpecError(message)
         return model
+
+    def _call(self, function: Callable[..., Any], arguments: Mapping[str, Any]) -> Any:
+        try:
+            return function(**arguments)
+        except Exception as fault:
+            message = f"{self.factory}: fails with options {dict(self.options or {})}: {fault}"
+            raise SpecError(message) from fault
 
     def _check_shape(self, x: Any, targets: Floats) -> None:
         rows = min(3, len(x))

@@ -10,7 +10,7 @@ from sklearn.base import BaseEstimator, RegressorMixin
 
 from castblast.network import Activation, Floats, Layer, run_layers
 from castblast.surrogate.chains import Chain, embed, one_for_each, side_by_side
-from castblast.surrogate.levenberg import fit_dense
+from castblast.surrogate.levenberg import LevenbergResult, fit_dense
 
 
 def layers_of(model: Any) -> Chain | None:
@@ -62,8 +62,10 @@ class LevenbergMlp(ChainRegressor):
     hidden_layers : sequence of int
     activation : {"tanh", "logistic", "silu"}
     penalty : float
-    max_iterations : int or sequence of int
-        Steps for all targets, or for each.
+    start_rows, start_iterations : int
+        A fit starts with so many steps on so many random rows, where they cost less.
+    max_iterations : int
+        Then so many steps on all rows.
     tolerance : float
     columns : sequence of sequences of int, optional
         Columns of the inputs that each target looks at; None: all.
@@ -86,7 +88,9 @@ class LevenbergMlp(ChainRegressor):
         hidden_layers: Sequence[int] = (32, 16),
         activation: Activation = "tanh",
         penalty: float = 0.0,
-        max_iterations: int | Sequence[int] = 150,
+        start_rows: int = 2500,
+        start_iterations: int = 100,
+        max_iterations: int = 40,
         tolerance: float = 1e-3,
         columns: Sequence[Sequence[int]] | None = None,
         categories: int = 0,
@@ -95,6 +99,8 @@ class LevenbergMlp(ChainRegressor):
         self.hidden_layers = hidden_layers
         self.activation = activation
         self.penalty = penalty
+        self.start_rows = start_rows
+        self.start_iterations = start_iterations
         self.max_iterations = max_iterations
         self.tolerance = tolerance
         self.columns = columns
@@ -104,35 +110,49 @@ class LevenbergMlp(ChainRegressor):
     def fit(self, x: Any, y: Any) -> Self:
         """Fit scaled rows x (n, k) to scaled targets y (n, m) or (n,)."""
         inputs, targets = np.asarray(x, dtype=np.float64), self._note_shape(y)
-        count = targets.shape[1]
-        limits = np.broadcast_to(self.max_iterations, count)
         self.n_iter_, self.converged_ = 0, True
         self.layers_ = side_by_side(
-            [self._fit_target(inputs, targets[:, j], j, int(limits[j])) for j in range(count)]
+            [self._fit_target(inputs, targets[:, j], j) for j in range(targets.shape[1])]
         )
         return self
 
-    def _fit_target(self, x: Floats, y: Floats, number: int, limit: int) -> Chain:
+    def _fit_target(self, x: Floats, y: Floats, number: int) -> Chain:
         seen = range(x.shape[1]) if self.columns is None else self.columns[number]
         seed = self.random_state + 1000 * number
         if not self.categories:
-            return embed(self._fit_rows(x[:, list(seen)], y, limit, seed), seen, x.shape[1])
+            return embed(self._fit_rows(x[:, list(seen)], y, seed), seen, x.shape[1])
         numbers = x.shape[1] - self.categories
         seen = [column for column in seen if column < numbers]
         chains = []
         for k in range(self.categories):
             rows = x[:, numbers + k] > 0.5
-            chains.append(
-                embed(self._fit_rows(x[rows][:, seen], y[rows], limit, seed), seen, numbers)
-            )
+            chains.append(embed(self._fit_rows(x[rows][:, seen], y[rows], seed), seen, numbers))
         return one_for_each(chains)
 
-    def _fit_rows(self, x: Floats, y: Floats, limit: int, seed: int) -> Chain:
-        result = fit_dense(
-            np.ascontiguousarray(x), np.ascontiguousarray(y), tuple(self.hidden_layers),
-            self.activation, penalty=self.penalty, max_steps=limit, tolerance=self.tolerance,
-            seed=seed,
-        )  # fmt: skip
+    def _fit_rows(self, x: Floats, y: Floats, seed: int) -> Chain:
+        """Fit one network, on some of the rows first if there are many more."""
+        steps, start = self.start_iterations + self.max_iterations, None
+        if len(y) > 1.5 * self.start_rows:
+            rows = np.random.default_rng(seed).permutation(len(y))[: self.start_rows]
+            first = self._levenberg(x[rows], y[rows], self.start_iterations, seed, None)
+            steps, start = self.max_iterations, first.weights
+            self.n_iter_ += first.steps
+        result = self._levenberg(x, y, steps, seed, start)
         self.n_iter_ += result.steps
         self.converged_ &= result.converged
         return result.layers
+
+    def _levenberg(
+        self, x: Floats, y: Floats, steps: int, seed: int, start: Floats | None
+    ) -> LevenbergResult:
+        return fit_dense(
+            np.ascontiguousarray(x),
+            np.ascontiguousarray(y),
+            tuple(self.hidden_layers),
+            self.activation,
+            penalty=self.penalty,
+            max_steps=steps,
+            tolerance=self.tolerance,
+            seed=seed,
+            start=start,
+        )

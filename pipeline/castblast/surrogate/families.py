@@ -84,9 +84,9 @@ def _levenberg(spec: LevenbergSpec, table: Table, seed: int) -> Any:
         hidden_layers=spec.hidden_layers,
         activation=spec.activation,
         penalty=spec.penalty,
-        max_iterations=tuple(
-            spec.target_iterations.get(name, spec.max_iterations) for name in spec.targets
-        ),
+        start_rows=spec.start_rows,
+        start_iterations=spec.start_iterations,
+        max_iterations=spec.max_iterations,
         tolerance=spec.tolerance,
         columns=tuple(tuple(seen_columns(spec, name, codes)) for name in spec.targets),
         categories=codes if spec.per_explosive else 0,
@@ -135,7 +135,7 @@ def _gaussian_process(spec: GaussianProcessSpec, table: Table, seed: int) -> Any
     return SubsetGaussianProcess(
         rows=spec.rows,
         tuning_rows=spec.tuning_rows,
-        smoothness=float("inf") if spec.smoothness == "infinite" else spec.smoothness,
+        smoothness={"3/2": 1.5, "5/2": 2.5}.get(spec.smoothness, float("inf")),
         random_state=seed,
     )
 

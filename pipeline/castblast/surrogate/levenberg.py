@@ -37,6 +37,8 @@ class LevenbergResult(NamedTuple):
     Attributes
     ----------
     layers : tuple of Layer
+    weights : (P,)
+        All weights and biases, where a further fit may start.
     steps : int
         Accepted ones.
     converged : bool
@@ -46,6 +48,7 @@ class LevenbergResult(NamedTuple):
     """
 
     layers: tuple[Layer, ...]
+    weights: Floats
     steps: int
     converged: bool
     mean_square: float
@@ -61,6 +64,7 @@ def fit_dense(
     max_steps: int,
     tolerance: float,
     seed: int,
+    start: Floats | None = None,
 ) -> LevenbergResult:
     """Fit a dense network to rows.
 
@@ -80,9 +84,11 @@ def fit_dense(
         Relative fall of the objective over ten steps at which the fit ends.
     seed : int
         Of the random weights at the start.
+    start : (P,), optional
+        Weights of an earlier fit of the same network, taken in place of random ones.
     """
     net = _Net((x.shape[1], *hidden, 1), activation, x, y)
-    weights = net.start(np.random.default_rng(seed))
+    weights = net.start(np.random.default_rng(seed)) if start is None else start
     matrix, gradient, square = net.normal_equations(weights)
     objective = square + penalty * float(weights @ weights)
     history = [objective]
@@ -111,7 +117,7 @@ def fit_dense(
         if not converged and len(history) <= max_steps:
             matrix, gradient, square = net.normal_equations(weights)
     mean_square = net.square(weights) / len(y)
-    return LevenbergResult(net.layers(weights), len(history) - 1, converged, mean_square)
+    return LevenbergResult(net.layers(weights), weights, len(history) - 1, converged, mean_square)
 
 
 def _solve(matrix: Floats, slope: Floats, shift: float) -> Floats | None:

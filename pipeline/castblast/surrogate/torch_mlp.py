@@ -129,7 +129,7 @@ class TorchMlp(ChainRegressor):
             self.adam_epochs, self.batch_size, self.learning_rate, self.max_iterations,
             self.tolerance, self.penalty,
         )  # fmt: skip
-        with _determined(seed):
+        with determined(seed):
             module = _dense(x.shape[1], self.hidden_layers, self.activation, y.shape[1])
             training = train_module(module, x, y, schedule, seed, watch)
         self.n_iter_ += training.iterations
@@ -168,7 +168,7 @@ class TorchRegressor(ChainRegressor):
     def fit(self, x: Any, y: Any) -> Self:
         """Fit scaled rows x (n, k) to scaled targets y (n, m) or (n,)."""
         inputs, targets = np.asarray(x, dtype=np.float64), self._note_shape(y)
-        with _determined(self.random_state):
+        with determined(self.random_state):
             self.module_ = copy.deepcopy(self.module).double()
             training = train_module(
                 self.module_, inputs, targets, self.schedule, self.random_state, self.watch
@@ -183,7 +183,7 @@ class TorchRegressor(ChainRegressor):
         """Evaluate rows (n, k)."""
         if hasattr(self, "layers_"):
             return super().predict(x)
-        with _determined(self.random_state):
+        with determined(self.random_state):
             values = _answers(self.module_, np.asarray(x, dtype=np.float64))
         return values[:, 0] if self.as_vector_ else values
 
@@ -369,7 +369,7 @@ def _flat(module: torch.nn.Module) -> Iterator[torch.nn.Module]:
 
 
 @contextmanager
-def _determined(seed: int) -> Iterator[None]:
+def determined(seed: int) -> Iterator[None]:
     """One thread, deterministic algorithms, own random numbers; all put back at the end."""
     threads = torch.get_num_threads()
     strict = torch.are_deterministic_algorithms_enabled()
