@@ -65,15 +65,19 @@ def fit_key(spec: ModelSpec, table: Table) -> dict[str, str]:
     }
 
 
-@cache
-def _code_hash() -> str:
-    """SHA-256 over the sources that turn a spec and rows into a fit."""
+def fit_sources() -> list[Path]:
+    """Sources that turn a spec and rows into a fit: a change of one makes every fit stale."""
     sources = [
         path for path in (_PACKAGE / "surrogate").glob("*.py") if path.stem not in _OBSERVERS
     ]
     sources += [*(_PACKAGE / "specs").glob("model*.py"), *(_PACKAGE / "network").glob("*.py")]
+    return sorted(sources)
+
+
+@cache
+def _code_hash() -> str:
     digest = hashlib.sha256()
-    for path in sorted(sources):
+    for path in fit_sources():
         digest.update(path.relative_to(_PACKAGE).as_posix().encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()
