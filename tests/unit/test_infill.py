@@ -12,6 +12,7 @@ from castblast.specs.model import PAPER_FEATURES, PAPER_TARGETS, MlpSpec, RidgeS
 from castblast.surrogate.ensemble import ensemble_spread, fit_members, with_members
 from castblast.surrogate.features import read_table
 from castblast.surrogate.infill import choose_batch, infill_worth
+from castblast.surrogate.training import fit_spec
 
 
 def nearest_gaps(points: np.ndarray) -> np.ndarray:
@@ -89,6 +90,16 @@ def test_members_travel_in_the_network(table) -> None:
     assert (found > 0.0).all()
     own = evaluate_rows(fits[0].network, numeric, index)
     np.testing.assert_array_equal(evaluate_rows(network, numeric, index), own)
+
+
+def test_restarts_that_were_not_chosen_can_travel(table) -> None:
+    """The members are the other restarts, whichever of them the validation rows chose."""
+    one = fit_spec(QUICK.model_copy(update={"keep_members": True}), table)
+    assert len(one.network.members) == 1
+    assert fit_spec(QUICK, table).network.members == ()
+    other = fit_members(QUICK, table, 2)[1 - one.chosen]
+    for mine, its in zip(one.network.members[0], other.network.layers, strict=True):
+        np.testing.assert_array_equal(mine.weights, its.weights)
 
 
 def test_what_cannot_be_an_ensemble_is_refused(table) -> None:

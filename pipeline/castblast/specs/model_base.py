@@ -195,10 +195,14 @@ class RandomStarts(SurrogateSpec):
         Fits from different random weights; the best on the validation rows is kept.
     seed : int
         Random numbers of restart i come from ``seed + i``.
+    keep_members : bool
+        The restarts that were not chosen travel in the exported network, for the spread of an
+        ensemble; the file grows by as much.
     """
 
     restarts: int = Field(1, ge=1, le=100)
     seed: int = Field(0, ge=0, lt=2**31)
+    keep_members: bool = False
 
     @property
     def seeds(self) -> range:

@@ -20,6 +20,7 @@ from castblast.network import (
     Floats,
     GoldenRows,
     InputColumn,
+    Layer,
     Network,
     OutputColumn,
 )
@@ -222,6 +223,14 @@ def to_network(
         provenance=provenance,
         derived=derived,
     )
+
+
+def chains_of(fitted: Sequence[Any]) -> tuple[tuple[Layer, ...], ...]:
+    """Layers of several fitted estimators of one spec, which share all scalings."""
+    from castblast.surrogate.dense_models import layers_of
+
+    chains = (layers_of(estimator.regressor_["model"]) for estimator in fitted)
+    return tuple(chain for chain in chains if chain is not None)
 
 
 def golden_rows(

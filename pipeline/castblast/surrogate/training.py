@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -157,6 +157,9 @@ def fit_spec(
     network = estimators.to_network(estimator, spec, table, band, provenance)
     if network is not None:
         network = with_density(network, table)
+        if getattr(spec, "keep_members", False):
+            others = [run[0] for run in runs if run[0] is not estimator]
+            network = replace(network, members=estimators.chains_of(others))
     progress(1.0, f"{spec.name}: 95 % within {restart.valid_error:.2%} on validation rows")
     restarts = tuple(run[1] for run in runs)
     seconds = time.perf_counter() - started
