@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from castblast.errors import DatasetError, SpecError
-from castblast.progress import ProgressCallback, silent
+from castblast.progress import ProgressCallback, part, silent
 from castblast.resources import resource
 from castblast.stages.compare_parts import (
     Done,
@@ -193,8 +193,8 @@ def compare(
     for folder in (fits, out):
         require_writable(folder)
     note_dataset(fits, dataset)
-    made = fit_all(wanted, table, fits, workers=workers, progress=_span(progress, 0.0, 0.5))
-    found = _judge(made, table, dataset, fits, extent, workers, _span(progress, 0.5, 0.95))
+    made = fit_all(wanted, table, fits, workers=workers, progress=part(progress, 0.0, 0.5))
+    found = _judge(made, table, dataset, fits, extent, workers, part(progress, 0.5, 0.95))
     progress(0.95, "writing the report")
     files = write_comparison(out, found, time.perf_counter() - started)
     if tracking:
@@ -220,10 +220,6 @@ def _read_specs(given: Sequence[Path]) -> list[ModelSpec]:
     return read_model_specs(paths)
 
 
-def _span(progress: ProgressCallback, low: float, high: float) -> ProgressCallback:
-    return lambda share, line: progress(low + (high - low) * share, line)
-
-
 def _judge(
     fits: list[Fit],
     table: Table,
@@ -245,7 +241,7 @@ def _judge(
         sizes = (extent.probe_points, extent.dense_points)
         parts.append(Part("probe", probe_part, (dataset, *sizes), {**about, "sizes": sizes}))
     kept = folder / "parts"
-    done = run_parts(parts, kept, workers=workers, progress=_span(progress, 0.0, 0.6))
+    done = run_parts(parts, kept, workers=workers, progress=part(progress, 0.0, 0.6))
     gates: dict[str, dict[str, Any]] = {}
     if domain:
         probe = done["probe"].value
@@ -256,8 +252,8 @@ def _judge(
     known = dataset if domain else None
     parts = _parts_of_chosen(chosen, table, known, about, extent)
     parts += _shift_parts(_shifted(chosen, fits, league), table, known, about, extent)
-    parts = [part for part in parts if part.name not in done]
-    done |= run_parts(parts, kept, workers=workers, progress=_span(progress, 0.6, 1.0))
+    parts = [one for one in parts if one.name not in done]
+    done |= run_parts(parts, kept, workers=workers, progress=part(progress, 0.6, 1.0))
     return Comparison(
         fits=fits,
         table=table,
@@ -266,13 +262,13 @@ def _judge(
         chosen=chosen,
         curves=_curves(fits, done),
         shifts={
-            name.removeprefix("shifts_"): part.value
-            for name, part in done.items()
+            name.removeprefix("shifts_"): result.value
+            for name, result in done.items()
             if name.startswith("shifts_")
         },
         sobol=_value(done, f"sobol_{chosen.spec.name}"),
         remarks=remarks,
-        seconds={name: part.seconds for name, part in done.items()},
+        seconds={name: result.seconds for name, result in done.items()},
         extent=extent,
     )
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from castblast.errors import DatasetError, SpecError
 from castblast.files import write_csv, write_text
-from castblast.progress import ProgressCallback, silent
+from castblast.progress import ProgressCallback, part, silent
 from castblast.stages.jobs import Job, available_cores, run_jobs
 
 if TYPE_CHECKING:
@@ -75,8 +75,8 @@ def fit_all(
     missing = [number for number, fit in enumerate(fits) if fit is None]
     if min(len(missing), workers or available_cores()) <= 1:
         for done, number in enumerate(missing):
-            part = part_of(progress, done, len(missing))
-            fits[number] = _fit_and_keep(specs[number], table, places[number], keys[number], part)
+            step = part(progress, done / len(missing), (done + 1) / len(missing))
+            fits[number] = _fit_and_keep(specs[number], table, places[number], keys[number], step)
     else:
         jobs = [
             Job(
@@ -122,11 +122,6 @@ def kept_fits(folder: Path) -> tuple[Path, list[ModelSpec]]:
         message = f"{folder}: holds no fits of castblast train; give the dataset instead"
         raise SpecError(message)
     return folder / note.read_text(encoding="utf-8").strip(), found
-
-
-def part_of(progress: ProgressCallback, number: int, parts: int) -> ProgressCallback:
-    """Callback for part `number` of `parts`."""
-    return lambda share, line: progress((number + share) / parts, line)
 
 
 def _fit_and_keep(

@@ -49,7 +49,7 @@ def run_jobs(
     workers : int, optional
         Processes at a time; None: the cores there are. With one, everything runs in this process.
     progress : callable
-        Told when a job ends.
+        Told what is under way.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def run_jobs(
     others = set(multiprocessing.active_children())
     with ProcessPoolExecutor(count, multiprocessing.get_context("spawn")) as pool:
         try:
-            return _collect(pool, jobs, progress)
+            return _collect(pool, jobs, count, progress)
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             for process in set(multiprocessing.active_children()) - others:
@@ -85,21 +85,24 @@ def _run_here(job: Job, number: int, count: int, progress: ProgressCallback) -> 
 
 
 def _collect(
-    pool: ProcessPoolExecutor, jobs: Sequence[Job], progress: ProgressCallback
+    pool: ProcessPoolExecutor, jobs: Sequence[Job], count: int, progress: ProgressCallback
 ) -> list[Any]:
     futures: dict[Future[Any], int] = {
         pool.submit(job.function, *job.arguments): number for number, job in enumerate(jobs)
     }
     results: list[Any] = [None] * len(jobs)
     left = set(futures)
-    progress(0.0, jobs[0].label)
     while left:
-        done, left = wait(left, timeout=1.0, return_when=FIRST_COMPLETED)
+        # Jobs start in order, so those under way are the first ones left.
+        under_way = sorted(futures[future] for future in left)[:count]
+        labels = ", ".join(jobs[number].label for number in under_way)
+        progress(1.0 - len(left) / len(jobs), labels)
+        done, left = wait(left, return_when=FIRST_COMPLETED)
         for future in done:
             number = futures[future]
             results[number] = future.result()
             keep = jobs[number].keep
             if keep is not None:
                 keep(results[number])
-            progress(1.0 - len(left) / len(jobs), f"{jobs[number].label}: done")
+    progress(1.0, jobs[-1].label)
     return results

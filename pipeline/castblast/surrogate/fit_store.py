@@ -29,7 +29,7 @@ from castblast.surrogate.training import Fit
 _OBSERVERS = (
     "comparison", "gate", "shifts", "strata", "learning", "sensitivity", "tuning", "tuning_space",
     "study_file", "timing", "tracking", "logged_model", "run_list", "infill", "probe",
-    "domain", "fit_store",
+    "domain", "ensemble", "fit_store",
 )  # fmt: skip
 _LIBRARIES = ("numpy", "scikit-learn", "torch")
 _PACKAGE = Path(__file__).resolve().parent.parent
