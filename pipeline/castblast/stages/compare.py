@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -295,7 +295,7 @@ def _curve(fit: Fit, table: Table, about: Mapping[str, Any], extent: Extent) -> 
     return Part(
         f"curve_{fit.spec.name}",
         curve_part,
-        (fit, table, extent.curve_sizes),
+        (replace(fit, estimator=None), table, extent.curve_sizes),  # the scores are all it takes
         {**_identity(fit, about), "sizes": extent.curve_sizes},
     )
 

@@ -121,7 +121,8 @@ def kept_fits(folder: Path) -> tuple[Path, list[ModelSpec]]:
     if not note.is_file() or not found:
         message = f"{folder}: holds no fits of castblast train; give the dataset instead"
         raise SpecError(message)
-    return folder / note.read_text(encoding="utf-8").strip(), found
+    dataset = os.path.normpath(folder / note.read_text(encoding="utf-8").strip())
+    return Path(dataset), found
 
 
 def _fit_and_keep(

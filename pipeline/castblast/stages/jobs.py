@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import pickle
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass
 from typing import Any
 
-from castblast.progress import ProgressCallback, silent
+from castblast.progress import ProgressCallback, part, silent
 
 
 @dataclass(frozen=True)
@@ -25,8 +26,8 @@ class Job:
     label : str
         For people.
     function : callable
-        Importable by its name; called with `arguments`. Runs in another process unless it is
-        the only one at a time, so arguments and result must be picklable.
+        Importable by its name; called with `arguments`. Runs in another process if there are
+        several at a time and the arguments can be pickled; then the result must be, too.
     arguments : tuple
     keep : callable, optional
         Told the result, in this process, as soon as it is there: what is kept survives a stop.
@@ -55,9 +56,33 @@ def run_jobs(
     ------
     Whatever a job raises; the others are stopped.
     """
-    count = min(len(jobs), workers or available_cores())
+    away = [number for number, job in enumerate(jobs) if _travels(job)]
+    count = min(len(away), workers or available_cores())
     if count <= 1:
-        return [_run_here(job, number, len(jobs), progress) for number, job in enumerate(jobs)]
+        away = []
+    share = len(away) / max(len(jobs), 1)
+    far = _run_away([jobs[number] for number in away], count, part(progress, 0.0, share))
+    results = dict(zip(away, far, strict=True))
+    here = [number for number in range(len(jobs)) if number not in results]
+    for done, number in enumerate(here, start=len(away)):
+        progress(done / len(jobs), jobs[number].label)
+        results[number] = _run_here(jobs[number])
+    return [results[number] for number in range(len(jobs))]
+
+
+def _travels(job: Job) -> bool:
+    """Whether the arguments can be sent to another process; a user's own estimator may not."""
+    try:
+        pickle.dumps(job.arguments, protocol=5)
+    except (pickle.PicklingError, AttributeError, TypeError):
+        return False
+    return True
+
+
+def _run_away(jobs: Sequence[Job], count: int, progress: ProgressCallback) -> list[Any]:
+    """Run jobs in processes; on a fault or a stop the others are ended."""
+    if not jobs:
+        return []
     others = set(multiprocessing.active_children())
     with ProcessPoolExecutor(count, multiprocessing.get_context("spawn")) as pool:
         try:
@@ -76,8 +101,7 @@ def available_cores() -> int:
     return os.cpu_count() or 1
 
 
-def _run_here(job: Job, number: int, count: int, progress: ProgressCallback) -> Any:
-    progress(number / count, job.label)
+def _run_here(job: Job) -> Any:
     result = job.function(*job.arguments)
     if job.keep is not None:
         job.keep(result)
