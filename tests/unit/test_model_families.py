@@ -1,6 +1,7 @@
 """Every family through `fit_spec`: parity of its network, its columns, users' own models."""
 
 import pickle
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -280,6 +281,21 @@ def test_a_factory_beside_the_file_needs_no_change_here(
     assert (fit.network is not None) is exportable
     if exportable:
         check_parity(fit)
+
+
+def test_two_folders_may_have_modules_of_one_name(tmp_path: Path, table: Table) -> None:
+    fits = []
+    for share in (0.0, 1.0):
+        folder = tmp_path / str(share)
+        folder.mkdir()
+        (folder / "namesake.py").write_text(
+            "from sklearn.linear_model import Ridge\n"
+            f"def model(): return Ridge(alpha=1e-6 + 1e6 * {share})\n"
+        )
+        fits.append(fit_spec(custom(folder, "namesake:model"), table))
+    errors = [fit.restart.valid_error for fit in fits]
+    assert errors[0] < 0.2 < errors[1]
+    assert not [entry for entry in sys.path if str(tmp_path) in entry]
 
 
 @pytest.mark.parametrize(("function", "exportable"), [("deep", True), ("odd", False)])

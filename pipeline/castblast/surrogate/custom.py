@@ -7,6 +7,7 @@ import inspect
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
@@ -92,7 +93,7 @@ class CustomModel(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         return values
 
     def _make(self, inputs: int, outputs: int) -> Any:
-        function = load_factory(self.factory)
+        function = load_factory(self.factory, self.folder)
         offered = dict(zip(_OFFERED, (inputs, outputs, self.random_state), strict=True))
         arguments = {**_taken(function, offered), **(self.options or {})}
         model = self._call(function, arguments)
@@ -136,8 +137,14 @@ class CustomModel(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             raise SpecError(message)
 
 
-def load_factory(factory: str) -> Callable[..., Any]:
+def load_factory(factory: str, folder: str = "") -> Callable[..., Any]:
     """Import what ``package.module:function`` names.
+
+    Parameters
+    ----------
+    factory : str
+    folder : str
+        Where a module of this name counts before one of another folder that is loaded already.
 
     Raises
     ------
@@ -146,6 +153,7 @@ def load_factory(factory: str) -> Callable[..., Any]:
         be called.
     """
     place, _, name = factory.partition(":")
+    _forget_namesake(place, folder)
     try:
         found: Any = importlib.import_module(place)
     except ModuleNotFoundError as fault:
@@ -167,6 +175,19 @@ def load_factory(factory: str) -> Callable[..., Any]:
         raise SpecError(message)
     function: Callable[..., Any] = found
     return function
+
+
+def _forget_namesake(place: str, folder: str) -> None:
+    """Unload a module of another folder that has the name of one in this folder."""
+    top = place.partition(".")[0]
+    loaded, home = sys.modules.get(top), Path(folder or ".").resolve()
+    own = folder and ((home / f"{top}.py").is_file() or (home / top).is_dir())
+    if loaded is None or not own:
+        return
+    file = getattr(loaded, "__file__", None)
+    if file is None or home not in Path(file).resolve().parents:
+        for name in [n for n in sys.modules if n == top or n.startswith(f"{top}.")]:
+            del sys.modules[name]
 
 
 @contextmanager
