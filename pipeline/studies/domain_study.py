@@ -10,6 +10,7 @@ together is torn. Which of them happen to lie in the design all the same, the re
 from __future__ import annotations
 
 import argparse
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,15 +18,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from castblast.dataset.store import reading_dataset
-from castblast.network import Floats, Network, density_score, in_domain
+from castblast.network import Floats, Network, density_score, in_domain, scale_columns
 from castblast.specs.model import PAPER_TARGETS, RidgeSpec
 from castblast.specs.recipe import Recipe, recipe_from_text
 from castblast.stages.infill import shares_of
 from castblast.surrogate.conformal import band_coverage
+from castblast.surrogate.density import LEVEL, fit_density
 from castblast.surrogate.features import Table, read_table
 from castblast.surrogate.training import fit_spec
 
 COPIES = 20
+TERMS = (1, 2, 4, 8, 16)
 
 
 def in_design(recipe: Recipe, rows: dict[str, Floats]) -> NDArray[np.bool_]:
@@ -51,6 +54,15 @@ def shuffled(table: Table, names: tuple[str, ...]) -> dict[str, Floats]:
     }
 
 
+def distances(train: Floats, rows: Floats) -> Floats:
+    """Mean distance to the five nearest training rows in whitened inputs: every row is kept."""
+    from scipy.spatial import cKDTree
+
+    white = np.linalg.cholesky(np.linalg.inv(np.cov(train.T)))
+    gaps = np.asarray(cKDTree(train @ white).query(rows @ white, k=5)[0])
+    return np.asarray(gaps.mean(axis=1))
+
+
 def report(network: Network, table: Table, recipe: Recipe) -> None:
     """Print the figures of one dataset."""
     names = network.input_names
@@ -72,6 +84,23 @@ def report(network: Network, table: Table, recipe: Recipe) -> None:
             f"  {label}: refused of test rows {alarms.mean():.2%}, of shuffled rows beyond the "
             f"design {refused[beyond].mean():.1%}, of those within {refused[~beyond].mean():.1%}"
         )
+    scaled = scale_columns(table.frame[list(names)].to_numpy(), network.inputs)
+    held = scaled[table.rows("valid", "calibration")]
+    for terms in TERMS:
+        density = fit_density(scaled[table.rows("train")], held, terms)
+        refused = density_score(replace(network, density=density), numeric) > 1.0
+        count = density.whitening.size + density.centres.size
+        print(
+            f"  density of {terms} terms ({count} numbers) alone: refused of shuffled rows "
+            f"beyond the design {refused[beyond].mean():.1%}, within {refused[~beyond].mean():.1%}"
+        )
+    train = scaled[table.rows("train")]
+    bound = np.sort(distances(train, held))[math.ceil((len(held) + 1) * LEVEL) - 1]
+    refused = distances(train, scale_columns(numeric, network.inputs)) > bound
+    print(
+        f"  distance to the five nearest training rows: {refused[beyond].mean():.1%}, within "
+        f"{refused[~beyond].mean():.1%}"
+    )
     score = density_score(network, test) > 1.0
     truth = np.zeros((len(score), 1))
     truth[score] = 2.0

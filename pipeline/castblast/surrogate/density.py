@@ -34,7 +34,9 @@ def with_density(network: Network, table: Table) -> Network:
     return replace(network, density=fit_density(scaled[table.rows("train")], held))
 
 
-def fit_density(train: Floats, held: Floats, seed: int = 0) -> DensityScore:
+def fit_density(
+    train: Floats, held: Floats, terms: int | None = None, seed: int = 0
+) -> DensityScore:
     """Fit the score and its bound.
 
     Parameters
@@ -45,6 +47,8 @@ def fit_density(train: Floats, held: Floats, seed: int = 0) -> DensityScore:
         Scaled inputs of rows that fitted nothing here: the bound is their quantile of `LEVEL`,
         with the rank that holds for one more such row (as in split-conformal bands). With fewer
         than 199 rows it is their largest score, and `level` says for what share that stands.
+    terms : int, optional
+        Of the mixture; default: `term_count`.
     seed : int
         Of the starting centres.
 
@@ -63,7 +67,10 @@ def fit_density(train: Floats, held: Floats, seed: int = 0) -> DensityScore:
     from threadpoolctl import threadpool_limits
 
     mixture = GaussianMixture(
-        term_count(*train.shape), reg_covar=_LEAST_VARIANCE, max_iter=200, random_state=seed
+        terms or term_count(*train.shape),
+        reg_covar=_LEAST_VARIANCE,
+        max_iter=200,
+        random_state=seed,
     )
     with warnings.catch_warnings(), threadpool_limits(1):
         # A mixture that could still be improved a little scores as well as any.
