@@ -8,7 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from castblast.report.style import BLUE, GREY, ORANGE, in_style, new_figure, save_figure
+from castblast.report.style import (
+    BLUE,
+    GREY,
+    ORANGE,
+    in_style,
+    new_figure,
+    plain_log_ticks,
+    save_figure,
+)
 
 
 @in_style
@@ -42,8 +50,10 @@ def _draw_history(axis: Any, trials: Sequence[tuple[int, float | None, str]]) ->
     stopped = [number for number, error, state in trials if error is None and state == "pruned"]
     numbers, errors = (np.array(column) for column in zip(*finished, strict=True))
     axis.semilogy(numbers, errors, "o", color=GREY, markersize=4, label="trial")
+    last = max(number for number, _, _ in trials)
+    lowest = np.minimum.accumulate(errors)
     axis.step(
-        numbers, np.minimum.accumulate(errors), where="post", color=BLUE, label="lowest so far"
+        [*numbers, last], [*lowest, lowest[-1]], where="post", color=BLUE, label="lowest so far"
     )
     if stopped:
         top = np.full(len(stopped), errors.max())
@@ -53,6 +63,7 @@ def _draw_history(axis: Any, trials: Sequence[tuple[int, float | None, str]]) ->
         xlabel="trial",
         ylabel="95 % of relative errors below [%]\n(geometric mean of the targets)",
     )
+    plain_log_ticks(axis.yaxis)
     axis.legend()
 
 

@@ -114,8 +114,8 @@ class Comparison:
     sobol : dict or None
     remarks : list of str
         What could not be done, and why.
-    seconds : mapping of part to float
-        As measured when the part was made.
+    times : mapping of part to mapping
+        ``seconds`` and ``cpu_seconds``, as measured when the part was made.
     extent : Extent
     """
 
@@ -128,7 +128,7 @@ class Comparison:
     shifts: Mapping[str, dict[str, Any]]
     sobol: dict[str, Any] | None
     remarks: list[str]
-    seconds: Mapping[str, float]
+    times: Mapping[str, Mapping[str, float]]
     extent: Extent
 
 
@@ -268,7 +268,10 @@ def _judge(
         },
         sobol=_value(done, f"sobol_{chosen.spec.name}"),
         remarks=remarks,
-        seconds={name: result.seconds for name, result in done.items()},
+        times={
+            name: {"seconds": result.seconds, "cpu_seconds": result.cpu_seconds}
+            for name, result in done.items()
+        },
         extent=extent,
     )
 

@@ -25,6 +25,10 @@ if TYPE_CHECKING:
     from castblast.surrogate.training import Fit
 
 
+#: Folders of the package that no part of a comparison uses.
+_NO_PART = ("muckpile", "report", "export", "stages", "cli")
+
+
 @dataclass(frozen=True)
 class Part:
     """One part of a comparison.
@@ -49,15 +53,17 @@ class Part:
     def key(self) -> dict[str, str]:
         """What the result was made from, hashed."""
         text = json.dumps(dict(self.inputs), sort_keys=True, default=str)
-        return {"inputs": hashlib.sha256(text.encode()).hexdigest(), "package": package_hash()}
+        inputs = hashlib.sha256(text.encode()).hexdigest()
+        return {"inputs": inputs, "package": package_hash(_NO_PART)}
 
 
 @dataclass(frozen=True)
 class Done:
-    """Result of a part and how long it took [s], when it was made."""
+    """Result of a part and how long it took when it was made: by the clock, of the processor."""
 
     value: Any
     seconds: float
+    cpu_seconds: float
 
 
 def run_parts(
@@ -95,9 +101,9 @@ def _keep(save: Callable[..., object], path: Path, key: dict[str, str], done: Do
 
 
 def _timed(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Done:
-    started = time.perf_counter()
+    started, worked = time.perf_counter(), time.process_time()
     value = function(*arguments)
-    return Done(value, time.perf_counter() - started)
+    return Done(value, time.perf_counter() - started, time.process_time() - worked)
 
 
 def probe_part(dataset: Path, points: int, dense: int) -> Any:

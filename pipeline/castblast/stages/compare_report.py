@@ -44,7 +44,7 @@ def write_comparison(out: Path, found: Comparison, seconds: float) -> list[Path]
         network.unlink(missing_ok=True)
     costs = timings(found.fits)
     files.append(write_page(out / "report.html", document, costs, files))
-    times = {"models": costs, "parts": dict(found.seconds), "comparison_seconds": seconds}
+    times = {"models": costs, "parts": dict(found.times), "comparison_seconds": seconds}
     files.append(write_json(out / "timings.json", times))
     return files
 

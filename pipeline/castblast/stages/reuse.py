@@ -15,10 +15,18 @@ _KEY_FILE = "made_from.json"
 
 
 @cache
-def package_hash() -> str:
-    """SHA-256 over all sources of the package: any change of code makes results stale."""
+def package_hash(without: tuple[str, ...] = ()) -> str:
+    """SHA-256 over all sources of the package: any change of code makes results stale.
+
+    Parameters
+    ----------
+    without : tuple of str
+        Folders of the package that have no part in the result.
+    """
     digest = hashlib.sha256()
     for source in sorted(_PACKAGE.rglob("*.py")):
+        if source.relative_to(_PACKAGE).parts[0] in without:
+            continue
         digest.update(source.relative_to(_PACKAGE).as_posix().encode())
         digest.update(source.read_bytes())
     return digest.hexdigest()
