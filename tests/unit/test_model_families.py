@@ -23,6 +23,7 @@ from castblast.specs.model import (
     read_model_specs,
 )
 from castblast.surrogate import estimators
+from castblast.surrogate.families import make_model
 from castblast.surrogate.features import Table, read_table, varying_inputs
 from castblast.surrogate.training import Fit, fit_spec
 
@@ -188,6 +189,15 @@ def test_validation_error_is_reported_and_may_end_the_fit(table: Table) -> None:
         fit_spec(spec, table, report=report)
     assert len(reported) == 2
     assert all(0.0 < error < np.inf for error in reported)
+
+
+def test_without_torch_its_family_says_what_to_install(
+    table: Table, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "torch", None)
+    monkeypatch.delitem(sys.modules, "castblast.surrogate.torch_mlp", raising=False)
+    with pytest.raises(SpecError, match=r"torch: kind torch_mlp needs PyTorch: pip install"):
+        make_model(TORCH[0], table, seed=0)
 
 
 def test_quick_specs_are_specs(repository: Path) -> None:
