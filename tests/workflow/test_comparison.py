@@ -148,6 +148,26 @@ def test_a_folder_of_fits_is_compared_as_it_stands(source, whole: Path, counted)
     assert again == (whole / "comparison" / "comparison.json").read_bytes()
 
 
+def test_unwritable_folders_are_named_first(
+    source, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """A file stands where a folder should be: as good as a folder without permission."""
+    (tmp_path / "blocked").write_text("")
+    blocked = str(tmp_path / "blocked" / "inside")
+    first = [str(source[0]), str(source[1][1])]
+    out = str(tmp_path / "out")
+    for arguments in (
+        ["compare", *first, "--out", blocked],
+        ["compare", *first, "--out", out, "--fits", blocked],
+        ["compare", *first, "--out", out, "--fits", str(tmp_path / "fits"), "--runs", blocked],
+        ["train", *first, "--out", blocked],
+        ["train", *first, "--out", out, "--runs", blocked],
+    ):
+        assert main(arguments) == 2
+        assert "blocked" in capsys.readouterr().err
+    assert not list(tmp_path.rglob("fit.json"))
+
+
 def test_two_at_a_time_give_the_same_bytes(source, whole: Path, tmp_path: Path) -> None:
     _compare(source, tmp_path, workers=2)
     assert _same(tmp_path) == _same(whole)

@@ -190,7 +190,7 @@ def compare(
     suffix = "" if extent is FULL else f"_{extent.name}"
     fits = dataset.parent / f"fits{suffix}" if fits is None else fits
     out = dataset.parent / f"comparison{suffix}" if out is None else out
-    for folder in (fits, out):
+    for folder in (fits, out, runs) if tracking else (fits, out):
         require_writable(folder)
     note_dataset(fits, dataset)
     made = fit_all(wanted, table, fits, workers=workers, progress=part(progress, 0.0, 0.5))

@@ -70,6 +70,8 @@ def train(
     table = read_rows(open_dataset(dataset), chosen, dataset)
     out = dataset.parent / "fits" if out is None else out
     require_writable(out)
+    if tracking:
+        require_writable(runs)
     note_dataset(out, dataset)
     fits = fit_all(chosen, table, out, workers=workers, progress=progress)
     if tracking:

@@ -70,6 +70,8 @@ def tune(
     table = read_rows(open_dataset(dataset), [wanted], dataset)
     folder = dataset.parent / "studies" / wanted.name if out is None else out
     require_writable(folder)
+    if tracking:
+        require_writable(runs)
     journal = folder / "study.journal" if study is None else study
     result = tuning.tune(
         wanted, table, journal, trials=trials, timeout=timeout, seed=seed, progress=progress

@@ -183,7 +183,11 @@ def _identity(spec: ModelSpec, space: SearchSpace, table: Table, seed: int) -> d
 @contextmanager
 def _quiet_optuna() -> Iterator[Any]:
     """Optuna without chatter; its earlier level is put back."""
-    import optuna
+    try:
+        import optuna
+    except ImportError:
+        message = "a study needs Optuna: pip install 'castblast[tune]'"
+        raise SpecError(message) from None
 
     level = optuna.logging.get_verbosity()
     optuna.logging.set_verbosity(optuna.logging.ERROR)
