@@ -12,7 +12,14 @@ from castblast.errors import SpecError
 from castblast.muckpile.particles import particles_at_rest
 from castblast.muckpile.terrain import heightmap, surface_faults, wall_faults
 from castblast.muckpile.walls import floor, ground_height, join, slope, surface
-from castblast.specs.ground import GroundSpec, one_or_many, read_ground, read_heights, read_stl
+from castblast.specs.ground import (
+    GroundSpec,
+    one_or_many,
+    read_ground,
+    read_heights,
+    read_stl,
+    smooth_heights,
+)
 from castblast.specs.loading import make_spec
 
 X, Y = np.array([0.0, 1.0, 2.0, 3.0]), np.array([10.0, 11.0, 12.0])
@@ -145,6 +152,32 @@ def test_ground_in_a_bench_file(tmp_path):
     with pytest.raises(SpecError, match="exactly one"):
         make_spec({"heightmap": "a.npz", "stl": "b.stl"}, GroundSpec, "bench.yaml")
     assert len(read_ground((), tmp_path).corner) == 0
+
+
+def test_heights_are_smoothed_and_extended(tmp_path):
+    """Level ground stays, an inclined plane stays inside, a spike keeps its volume and spreads.
+
+    Over an uneven grid as well; the spread is the variance of the weights.
+    """
+    x = np.concatenate([np.arange(0.0, 20.0, 0.5), np.arange(20.0, 40.1, 0.25)])
+    y = np.arange(0.0, 30.0, 0.4)
+    plane = 1.0 + 0.3 * x[None, :] + 0.2 * y[:, None]
+    inside = np.ix_((y > 8.0) & (y < 22.0), (x > 8.0) & (x < 16.0))
+    np.testing.assert_allclose(smooth_heights(x, y, plane, 1.0)[inside], plane[inside], rtol=1e-6)
+    assert np.ptp(smooth_heights(x, y, np.full_like(plane, 3.0), 2.0)) < 1e-12
+    spike = np.zeros_like(plane)
+    spike[37, 20] = 5.0
+    found = smooth_heights(x, y, spike, 1.0)
+    assert found.sum() * 0.5 * 0.4 == pytest.approx(5.0 * 0.5 * 0.4, rel=1e-6)
+    spread = (found.sum(axis=0) @ (x - x[20]) ** 2) / found.sum()
+    assert spread == pytest.approx(1.0, rel=1e-3)
+    np.savez(tmp_path / "pile.npz", x=X, y=Y, height=HEIGHT)
+    names = {"heightmap": "pile.npz", "smooth": "1 m", "extend": "2 m"}
+    walls = read_ground((make_spec(names, GroundSpec, "bench.yaml"),), tmp_path)
+    assert walls.corner[..., 0].min() == X[0] - 2.0
+    assert walls.corner[..., 1].max() == Y[-1] + 2.0
+    with pytest.raises(SpecError, match="go with a heightmap"):
+        make_spec({"stl": "a.stl", "smooth": "1 m"}, GroundSpec, "bench.yaml")
 
 
 def test_a_wall_that_cuts_balls_is_named():

@@ -12,10 +12,12 @@ from math import cos, pi, radians, sin, tan
 import numpy as np
 import pytest
 
+from castblast.muckpile.case import CastCase
 from castblast.muckpile.contact import ContactLaw
 from castblast.muckpile.particles import ball_mass, particles_at_rest
 from castblast.muckpile.simulation import Simulation
-from castblast.muckpile.terrain import heightmap
+from castblast.muckpile.solver import run_cast
+from castblast.muckpile.terrain import heightmap, surface_faults
 from castblast.muckpile.threads import thread_count
 from castblast.muckpile.walls import Walls, floor, join, plane, surface
 
@@ -232,10 +234,39 @@ def test_a_surface_that_ends_on_the_floor_has_no_rim_there():
     """A ball at rest on the floor beside the foot of a pile does not feel the foot."""
     x = np.array([-1.0, 0.0, 1.0])
     ground = heightmap(x, x, np.tile(np.array([0.0, 0.0, 0.02]), (3, 1)), base=0.0)
-    assert len(ground.corner) == 4
+    rise = np.cross(
+        ground.corner[:, 1] - ground.corner[:, 0], ground.corner[:, 2] - ground.corner[:, 0]
+    )
+    assert np.sum(rise[:, 2] > 0.0) == 4
     rest = M * G / KN
     end = outcome(join(floor(), ground), (-0.0023, 0.3, R - rest), until=0.3)[0]
     np.testing.assert_allclose(end[:3], (-0.0023, 0.3, R - rest), atol=1e-9)
+
+
+def test_nothing_comes_below_ground_from_the_side():
+    """Thirty balls thrown at the end of ground 0.35 m high, three and a half radii: energy closes.
+
+    The face stops a ball as a plane in its place does, to where rounding makes two paths of one. In
+    the pile none is left in the rock.
+    """
+    x = np.linspace(0.0, 2.0, 5)
+    ground = join(floor(), heightmap(x, x, np.full((5, 5), 0.35), base=0.0))
+    assert surface_faults(ground.corner) == []
+    start, velocity = (-0.3, 0.9, R - M * G / KN), (2.0, 0.0, 0.0)
+    stopped = outcome(ground, start, velocity, until=0.15)
+    face = join(floor(), plane((0, 0, 0), (-1, 0, 0)))
+    np.testing.assert_allclose(stopped, outcome(face, start, velocity, until=0.15), atol=1e-9)
+    grid = np.stack(np.meshgrid(*map(np.arange, (2, 5, 3)), indexing="ij"), axis=-1).reshape(-1, 3)
+    place = np.array([-0.45, 0.5, R]) + 0.202 * grid
+    balls = particles_at_rest(place, np.full(len(place), R))
+    balls.velocity[:, 0] = 4.0
+    case = CastCase(balls, LAW, ground, np.zeros(0), np.zeros((0, 3)), max_time=1.0, time_step=2e-4)
+    result = run_cast(case)
+    assert abs(result.ledger.residual) < 0.01
+    end = result.particles.position
+    over = (end[:, 0] > 0.0) & (end[:, 0] < 2.0) & (end[:, 1] > 0.0) & (end[:, 1] < 2.0)
+    assert (end[over, 2] > 0.35).all()
+    assert (end[:, 2] > 0.9 * R).all()
 
 
 def test_box_of_facets_as_obstacle_is_hit_on_all_sides():

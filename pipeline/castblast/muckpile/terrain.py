@@ -18,6 +18,7 @@ from castblast.muckpile.particles import FloatArray, IntArray, Particles
 from castblast.muckpile.walls import (
     Walls,
     ground_height,
+    join,
     near_walls,
     surface,
     wall_distance,
@@ -82,7 +83,8 @@ def heightmap(
         Used for sliding and for rolling; NaN: that of the contact law.
     base : float [m]
         Level of a floor on which the ground lies: cells no higher than it are left to the floor,
-        and the ground goes over into it without a rim. Default: there is no such floor.
+        and the ground goes over into it without a rim. Where it ends higher, it ends in a vertical
+        face, so that nothing comes below it from the side. Default: there is no such floor.
 
     Raises
     ------
@@ -101,7 +103,29 @@ def heightmap(
     upper = np.where(split, np.stack([a, c, d], axis=-2), np.stack([b, c, d], axis=-2))
     corner = np.stack([lower, upper], axis=2).reshape(-1, 3, 3)
     above = (corner[:, :, 2] > base).any(axis=1)
-    return surface(corner[above], friction, depth=GROUND_DEPTH, base=base)
+    ground = surface(corner[above], friction, depth=GROUND_DEPTH, base=base)
+    if base == -inf:
+        return ground
+    return join(ground, surface(_end_faces(point, base), friction, base=base))
+
+
+def _end_faces(point: FloatArray, base: float) -> FloatArray:
+    """Vertical facets (t, 3, 3) [m] below the border of a grid (ny, nx, 3) [m], to below `base`.
+
+    They hold little more than their face: behind them balls may lie in a hollow of the ground.
+    """
+    border = np.concatenate([point[0, :-1], point[:-1, -1], point[-1, :0:-1], point[:0:-1, 0]])
+    foot = border.copy()
+    foot[:, 2] = min(base, border[:, 2].min()) - 1.0
+    after, foot_after = np.roll(border, -1, axis=0), np.roll(foot, -1, axis=0)
+    facets = np.stack(
+        [
+            np.stack([foot, foot_after, after], axis=1),
+            np.stack([foot, after, border], axis=1),
+        ],
+        axis=1,
+    )
+    return facets[np.maximum(border[:, 2], after[:, 2]) > base].reshape(-1, 3, 3)
 
 
 def surface_faults(corner: FloatArray) -> list[str]:

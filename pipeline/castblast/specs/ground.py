@@ -44,6 +44,13 @@ class GroundSpec(Spec):
         For sliding and rolling; default: that of the contact law.
     floor : length
         Level of the floor around the bench. Heights no higher than it are left to the floor.
+    smooth : length
+        Heights are averaged with Gaussian weights of this standard deviation. The surface of an
+        earlier pile is rough where single balls lie; balls get stuck in pits narrower than they
+        are, so such a surface wants two mean radii and more.
+    extend : length
+        The outermost heights go on outwards so far, such as half a cell of a surface that is given
+        by the middles of its cells.
     """
 
     heightmap: Annotated[str, Field(min_length=1)] | None = None
@@ -51,11 +58,16 @@ class GroundSpec(Spec):
     shift: tuple[_Shift, _Shift, _Shift] = (0.0, 0.0, 0.0)
     friction: Annotated[float, QuantityIn("1", 0.0, 5.0)] | None = None
     floor: Annotated[float, QuantityIn("m", -1e4, 1e4)] = 0.0
+    smooth: Annotated[float, QuantityIn("m", 0.0, 1e3)] = 0.0
+    extend: Annotated[float, QuantityIn("m", 0.0, 1e4)] = 0.0
 
     @model_validator(mode="after")
     def _one_of_two(self) -> GroundSpec:
         if (self.heightmap is None) == (self.stl is None):
             message = "exactly one of 'heightmap' and 'stl' is needed"
+            raise QuantityError(message)
+        if self.stl is not None and (self.smooth or self.extend):
+            message = "'smooth' and 'extend' go with a heightmap"
             raise QuantityError(message)
         return self
 
@@ -87,8 +99,28 @@ def _read_one(ground: GroundSpec, beside: Path) -> Walls:
         return surface(corner, friction, base=ground.floor)
     assert ground.heightmap is not None
     x, y, height = read_heights(beside / ground.heightmap)
+    if ground.smooth > 0.0:
+        height = smooth_heights(x, y, height, ground.smooth)
+    if ground.extend > 0.0:
+        x, y = (np.array([v[0] - ground.extend, *v, v[-1] + ground.extend]) for v in (x, y))
+        height = np.pad(height, 1, mode="edge")
     dx, dy, dz = ground.shift
     return heightmap(x + dx, y + dy, height + dz, friction, base=ground.floor)
+
+
+def smooth_heights(x: FloatArray, y: FloatArray, height: FloatArray, width: float) -> FloatArray:
+    """Average heights (ny, nx) with Gaussian weights of standard deviation `width`; all in m.
+
+    Each height counts for the part of its axis that is nearest to it, so that the spacing of the
+    places does not matter.
+    """
+
+    def weights(place: FloatArray) -> FloatArray:
+        apart = (place[:, None] - place[None, :]) / width
+        share = np.exp(-0.5 * apart**2) * np.gradient(place)[None, :]
+        return np.asarray(share / share.sum(axis=1, keepdims=True))
+
+    return np.asarray(weights(y) @ height @ weights(x).T)
 
 
 def read_heights(path: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
