@@ -1,6 +1,7 @@
 """Comparisons that are stopped, repeated and shared out; the lab book read without its library."""
 
 import json
+import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -9,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from castblast.cli import main
+from castblast.errors import SimulationError
 from castblast.stages.compare import DEMO, compare
 from castblast.stages.jobs import Job, run_jobs
 from castblast.stages.runs import list_runs
@@ -179,6 +181,12 @@ def test_jobs_end_with_the_first_fault() -> None:
     with pytest.raises(ZeroDivisionError):
         run_jobs([Job("long", time.sleep, (60,)), Job("bad", divmod, (1, 0))], workers=2)
     assert time.monotonic() - begun < 30
+
+
+def test_a_process_that_dies_is_said() -> None:
+    jobs = [Job("fit a", os._exit, (1,)), Job("fit b", time.sleep, (60,))]
+    with pytest.raises(SimulationError, match=r"a process died on one of: fit a, fit b"):
+        run_jobs(jobs, workers=2)
 
 
 def test_results_come_in_the_order_of_the_jobs() -> None:

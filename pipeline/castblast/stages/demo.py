@@ -20,7 +20,7 @@ from castblast.stages.reuse import is_valid, make_key, mark_valid
 
 RECIPE = "data_specs/recipes/quickstart.yaml"
 BENCH = "data_specs/benches/demo.yaml"
-MODELS = ("reference_mlp", "reference_mlp_log", "wide_mlp_log")
+MODELS = ("reference_mlp", "wide_mlp_log", "levenberg")
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,11 @@ import multiprocessing
 import os
 import pickle
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass
 from typing import Any
 
+from castblast.errors import SimulationError
 from castblast.progress import ProgressCallback, part, silent
 
 
@@ -48,13 +49,17 @@ def run_jobs(
     ----------
     jobs : sequence of Job
     workers : int, optional
-        Processes at a time; None: the cores there are. With one, everything runs in this process.
+        Processes at a time; None: the cores there are. With one, everything runs in this process;
+        with more, a script needs the usual ``if __name__ == "__main__"``.
     progress : callable
         Told what is under way.
 
     Raises
     ------
-    Whatever a job raises; the others are stopped.
+    SimulationError
+        A process died.
+    Exception
+        Whatever a job raises; the others are stopped.
     """
     away = [number for number, job in enumerate(jobs) if _travels(job)]
     count = min(len(away), workers or available_cores())
@@ -124,7 +129,14 @@ def _collect(
         done, left = wait(left, return_when=FIRST_COMPLETED)
         for future in done:
             number = futures[future]
-            results[number] = future.result()
+            try:
+                results[number] = future.result()
+            except BrokenExecutor:
+                message = (
+                    f"a process died on one of: {labels} (out of memory?); what is finished is "
+                    "kept, run again with --workers 1"
+                )
+                raise SimulationError(message) from None
             keep = jobs[number].keep
             if keep is not None:
                 keep(results[number])
