@@ -107,6 +107,19 @@ def test_ground_that_cuts_the_packing_is_refused(tmp_path: Path, packings: Path)
     assert not (tmp_path / "out").exists()
 
 
+def test_ground_with_pits_narrower_than_balls_is_refused(tmp_path: Path, packings: Path) -> None:
+    """Heights that alternate by 1 m; averaged over 2 m they are level ground."""
+    rough = np.add.outer(np.arange(len(Y)), np.arange(len(X))) % 2 * 1.0
+    options = {"threads": 1, "packings": packings, "decks": Decks(None, tmp_path / "deck")}
+    with pytest.raises(SpecError, match="heights stand out from both neighbours"):
+        run_muckpile(written(tmp_path, rough), tmp_path / "out", **options)
+    bench = written(tmp_path, rough)
+    content = yaml.safe_load(bench.read_text())
+    content["ground"]["smooth"] = "2 m"
+    bench.write_text(yaml.safe_dump(content))
+    assert run_muckpile(bench, tmp_path / "out", **options).files
+
+
 def test_hash_of_a_bench_covers_the_files_that_it_names(tmp_path: Path) -> None:
     """Not its layout; a changed height, ball or hole is another bench under the same name."""
     height = np.zeros((len(Y), len(X)))

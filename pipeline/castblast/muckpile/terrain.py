@@ -125,7 +125,8 @@ def _end_faces(point: FloatArray, base: float) -> FloatArray:
         ],
         axis=1,
     )
-    return facets[np.maximum(border[:, 2], after[:, 2]) > base].reshape(-1, 3, 3)
+    rises = np.maximum(border[:, 2], after[:, 2]) > base
+    return np.asarray(facets[rises].reshape(-1, 3, 3))
 
 
 def surface_faults(corner: FloatArray) -> list[str]:

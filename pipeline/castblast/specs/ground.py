@@ -46,8 +46,8 @@ class GroundSpec(Spec):
         Level of the floor around the bench. Heights no higher than it are left to the floor.
     smooth : length
         Heights are averaged with Gaussian weights of this standard deviation. The surface of an
-        earlier pile is rough where single balls lie; balls get stuck in pits narrower than they
-        are, so such a surface wants two mean radii and more.
+        earlier pile is rough where single balls lie, and is refused (`rough_ground`); it wants
+        three mean radii.
     extend : length
         The outermost heights go on outwards so far, such as half a cell of a surface that is given
         by the middles of its cells.
@@ -92,15 +92,48 @@ def read_ground(grounds: tuple[GroundSpec, ...], beside: Path) -> Walls:
     return join(*(_read_one(ground, beside) for ground in grounds))
 
 
+def rough_ground(grounds: tuple[GroundSpec, ...], beside: Path, radius: float) -> list[str]:
+    """Name heightmaps that are rougher than balls of mean `radius` [m] can lie on; []: none.
+
+    Ridges and pits thinner than a ball, higher than its radius, hold it on both sides at once, deep
+    inside the rock: it gains energy from nothing.
+    """
+    faults = []
+    for ground in grounds:
+        if ground.heightmap is None:
+            continue
+        _, _, height = _heights(ground, beside)
+        step = [np.diff(height, axis=axis) for axis in (0, 1)]
+        pairs = [
+            (s[:-1], s[1:]) if axis == 0 else (s[:, :-1], s[:, 1:]) for axis, s in enumerate(step)
+        ]
+        rough = sum(
+            int(np.sum((a * b < 0.0) & (np.minimum(np.abs(a), np.abs(b)) > radius)))
+            for a, b in pairs
+        )
+        if rough:
+            faults.append(
+                f"{beside / ground.heightmap}: {rough} heights stand out from both neighbours by "
+                f"more than the mean radius of the balls, {radius:.2g} m; set "
+                f"'smooth: {4.0 * radius:.1g} m' or a wider grid"
+            )
+    return faults
+
+
+def _heights(ground: GroundSpec, beside: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
+    assert ground.heightmap is not None
+    x, y, height = read_heights(beside / ground.heightmap)
+    if ground.smooth > 0.0:
+        height = smooth_heights(x, y, height, ground.smooth)
+    return x, y, height
+
+
 def _read_one(ground: GroundSpec, beside: Path) -> Walls:
     friction = math.nan if ground.friction is None else ground.friction
     if ground.stl is not None:
         corner = read_stl(beside / ground.stl) + np.array(ground.shift)
         return surface(corner, friction, base=ground.floor)
-    assert ground.heightmap is not None
-    x, y, height = read_heights(beside / ground.heightmap)
-    if ground.smooth > 0.0:
-        height = smooth_heights(x, y, height, ground.smooth)
+    x, y, height = _heights(ground, beside)
     if ground.extend > 0.0:
         x, y = (np.array([v[0] - ground.extend, *v, v[-1] + ground.extend]) for v in (x, y))
         height = np.pad(height, 1, mode="edge")

@@ -22,7 +22,7 @@ from castblast.muckpile.walls import Walls, bench_walls, join, slope
 from castblast.progress import ProgressCallback, silent
 from castblast.specs.balls import ChosenSizes
 from castblast.specs.bench import BenchSpec, find_bench, load_bench
-from castblast.specs.ground import read_ground
+from castblast.specs.ground import read_ground, rough_ground
 from castblast.specs.quantity import parse_quantity
 from castblast.stages.muckpile_deck import Decks, write_decks
 from castblast.stages.muckpile_extras import Extras, read_extras
@@ -113,7 +113,7 @@ def run_muckpile(
         _part(progress, 0.0, _PACKING_SHARE),
     )
     case = _case(spec, walls, start.balls, plan, threads)
-    _require_possible(spec, case)
+    _require_possible(spec, case, path.parent)
     if decks.wanted:
         return write_decks(spec, case, decks)
     folder.mkdir(parents=True, exist_ok=True)
@@ -260,11 +260,12 @@ def _case(spec: BenchSpec, walls: Walls, balls: Particles, plan: Plan, threads: 
     )
 
 
-def _require_possible(spec: BenchSpec, case: CastCase) -> None:
-    """Refuse walls that cut the balls, and a fixed step above the stable one."""
+def _require_possible(spec: BenchSpec, case: CastCase, beside: Path) -> None:
+    """Refuse walls that cut the balls, rough ground, and a fixed step above the stable one."""
     allowed = pressed_share(case.particles, case.law, case.gravity)
     cuts = wall_faults(case.walls, case.particles, allowed)
     faults = [f"{spec.name}: {cut}" for cut in cuts]
+    faults += rough_ground(spec.ground, beside, float(case.particles.radius.mean()))
     if not faults and case.time_step > 0.0:
         stable = _stable_step(case)
         if case.time_step > stable:
