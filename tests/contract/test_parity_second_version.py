@@ -9,6 +9,7 @@ import pytest
 from castblast.export.json_file import from_json, to_document, to_json
 from castblast.export.onnx_file import run_onnx_rows, to_onnx
 from castblast.export.parity import check_parity
+from castblast.export.targets import TARGETS
 from castblast.network import (
     Constraint,
     DensityScore,
@@ -24,7 +25,7 @@ from castblast.network import (
 )
 
 pytest.importorskip("onnxruntime", reason="ONNX files are run with onnxruntime")
-WRITERS = {"json": lambda network: to_json(network).encode(), "onnx": to_onnx}
+WRITERS = {name: TARGETS[name].write for name in ("json", "onnx")}
 NAMES = ("bench_height", "charge_length", "burden")
 
 

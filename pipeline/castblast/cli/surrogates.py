@@ -173,13 +173,23 @@ def export(
         Path, typer.Argument(help="Folder of a comparison or a fit, or a network.json.")
     ],
     out: OutFolder = None,
-    to: Annotated[str, typer.Option(help="Targets, separated by commas.")] = "json,onnx",
-    verify: Annotated[bool, typer.Option(help="Run every export and compare it.")] = True,
+    to: Annotated[
+        str,
+        typer.Option(
+            help="Targets, separated by commas: json, onnx, c, js, python, pfc, lammps, excel; "
+            "or all."
+        ),
+    ] = "json,onnx",
+    verify: Annotated[
+        bool,
+        typer.Option(help="Run every export on golden rows and compare (exit code 4: differs)."),
+    ] = True,
 ) -> Mapping[str, Any]:
     """Write the network for other tools and prove that it gives the same numbers."""
     from castblast.stages.export import export as run
 
-    outcome = run(fit, out, targets=to.split(","), verify=verify)
+    with screen.progress("export") as progress:
+        outcome = run(fit, out, targets=to.split(","), verify=verify, progress=progress)
     for line in outcome.lines:
         screen.say(line)
     return outcome.document

@@ -87,17 +87,17 @@ def to_json(network: Network) -> str:
     ValueError
         A number is not finite (a `Network` with finite golden rows has none).
     """
-    return _pretty(to_document(network)) + "\n"
+    return pretty(to_document(network)) + "\n"
 
 
-def _pretty(value: Any, indent: str = "") -> str:
+def pretty(value: Any, indent: str = "") -> str:
     """JSON with flat lists on one line: reviewable in a diff, and half as long."""
     inner = indent + "  "
     if isinstance(value, dict) and value:
-        lines = [f"{inner}{json.dumps(key)}: {_pretty(item, inner)}" for key, item in value.items()]
+        lines = [f"{inner}{json.dumps(key)}: {pretty(item, inner)}" for key, item in value.items()]
         return "{\n" + ",\n".join(lines) + f"\n{indent}}}"
     if isinstance(value, list) and any(isinstance(item, list | dict) for item in value):
-        return "[\n" + ",\n".join(inner + _pretty(item, inner) for item in value) + f"\n{indent}]"
+        return "[\n" + ",\n".join(inner + pretty(item, inner) for item in value) + f"\n{indent}]"
     return json.dumps(value, allow_nan=False)
 
 

@@ -8,7 +8,8 @@ Inputs: ``numeric`` float64 [n, k] in SI, columns in the order of the metadata e
 per output under its own name; the ends of its 95 % band, ``NAME_lower`` and ``NAME_upper``; for a
 network with members ``NAME_spread``, their relative standard deviation; ``domain_score`` float64,
 at most 1 inside the joint density of the training rows (NaN without one); ``in_domain`` bool, box,
-rules and density together. The metadata carry units, domain box, rules, density and bands.
+rules and density together; ``offending`` bool [n, k], the inputs at fault where it is false. The
+metadata carry units, domain box, rules, density and bands.
 """
 
 from __future__ import annotations
@@ -19,13 +20,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from castblast.export.answers import Answers
 from castblast.network import (
+    BLAME,
     Column,
     Constraint,
+    DensityScore,
     Floats,
     Layer,
     Network,
-    RowPredictions,
     derived_matrix,
 )
 
@@ -107,6 +110,11 @@ class _Graph:
             position = self.constant(f"{name}_position", np.array(j, dtype=np.int64))
             self.add("Gather", name, x, position, axis=1)
 
+    def column(self, x: str, label: str) -> str:
+        """Make (n,) into (n, 1)."""
+        axes = self.constant(f"{label}_axes", np.array([1], dtype=np.int64))
+        return self.add("Unsqueeze", f"{label}_column", x, axes)
+
     def row_sums(self, x: str, label: str) -> str:
         """Sum along the columns: (n, m) to (n,)."""
         axes = self.constant(f"{label}_axes", np.array([1], dtype=np.int64))
@@ -148,6 +156,7 @@ def to_onnx(network: Network) -> bytes:
     inputs.append(entry("explosive", TensorProto.INT64))
     outputs = [entry(name, TensorProto.DOUBLE) for name in _result_names(network)]
     outputs.append(entry("in_domain", TensorProto.BOOL))
+    outputs.append(entry("offending", TensorProto.BOOL, len(network.inputs)))
     model = helper.make_model(
         helper.make_graph(graph.nodes, "castblast", inputs, outputs, initializer=graph.constants),
         producer_name="castblast",
@@ -197,11 +206,12 @@ def _add_spread(graph: _Graph, values: str, features: str, network: Network) -> 
 
 
 def _add_domain(graph: _Graph, scaled: str, network: Network) -> None:
-    """Score of the joint density, and the flag of box, rules and density."""
-    conditions = [
+    """Score of the joint density, flag of box, rules and density, and the inputs at fault."""
+    above, below = (
         graph.add(operator, f"box_{end}", "numeric", graph.constant(end, _of(network.inputs, end)))
         for operator, end in (("GreaterOrEqual", "lower"), ("LessOrEqual", "upper"))
-    ]
+    )
+    faults = graph.add("Not", "box_faults", graph.add("And", "box_kept", above, below))
     if network.constraints:
         matrix = np.array(
             [
@@ -212,36 +222,63 @@ def _add_domain(graph: _Graph, scaled: str, network: Network) -> None:
         )
         sums = graph.add("MatMul", "rule_sums", "numeric", graph.constant("rules", matrix))
         least = graph.constant("rule_lower", _of(network.constraints, "lower"))
-        conditions.append(graph.add("GreaterOrEqual", "rules_kept", sums, least))
-    score = _density(graph, scaled, network)
-    if network.density is not None:
-        usual = graph.add("LessOrEqual", "usual", score, graph.constant("one", np.array([1.0])))
-        axes = graph.constant("usual_axes", np.array([1], dtype=np.int64))
-        conditions.append(graph.add("Unsqueeze", "usual_column", usual, axes))
-    table = graph.add("Concat", "conditions", *conditions, axis=1)
-    broken = graph.add("Cast", "broken", graph.add("Not", "failed", table), to=_DOUBLE)
+        kept = graph.add("GreaterOrEqual", "rules_kept", sums, least)
+        broken = graph.add("Cast", "rules_broken", graph.add("Not", "rule_fault", kept), to=_DOUBLE)
+        named = np.array(
+            [[name in rule.coefficients for name in network.input_names]
+             for rule in network.constraints], dtype=np.float64,
+        )  # fmt: skip
+        count = graph.add("MatMul", "rule_counts", broken, graph.constant("rule_inputs", named))
+        some = graph.add("Greater", "rule_faults", count, graph.constant("no_rule", np.zeros(1)))
+        faults = graph.add("Or", "plain_faults", faults, some)
+    broken = graph.add("Cast", "broken", faults, to=_DOUBLE)
     half = graph.constant("half", np.array([0.5]))
-    graph.add("Less", "in_domain", graph.row_sums(broken, "faults"), half)
-
-
-def _density(graph: _Graph, scaled: str, network: Network) -> str:
-    density = network.density
-    if density is None:
+    kept = graph.add("Less", "box_and_rules_kept", graph.row_sums(broken, "faults"), half)
+    if network.density is None:
         # No value for any row, but one for every row.
         nothing = graph.row_sums(scaled, "any_number")
         missing = graph.constant("missing", np.array([np.nan]))
-        return graph.add("Add", "domain_score", nothing, missing)
-    distances = []
+        graph.add("Add", "domain_score", nothing, missing)
+        graph.add("Identity", "in_domain", kept)
+        graph.add("Identity", "offending", faults)
+        return
+    blamed = _density(graph, scaled, network.density)
+    one = graph.constant("one", np.array([1.0]))
+    usual = graph.add("LessOrEqual", "usual", "domain_score", one)
+    graph.add("And", "in_domain", kept, usual)
+    unusual = graph.add("And", "unusual", kept, graph.add("Not", "not_usual", usual))
+    together = graph.add("And", "together", graph.column(unusual, "unusual"), blamed)
+    graph.add("Or", "offending", faults, together)
+
+
+def _density(graph: _Graph, scaled: str, density: DensityScore) -> str:
+    """Add `domain_score`; return which inputs make a row unusual about its nearest centre."""
+    distances, reliefs = [], []
     for j, centre in enumerate(density.centres):
+        whitening = density.whitening[j]
         step = graph.add("Sub", f"step_{j}", scaled, graph.constant(f"centre_{j}", centre))
-        matrix = graph.constant(f"whitening_{j}", density.whitening[j].T)
+        matrix = graph.constant(f"whitening_{j}", whitening.T)
         white = graph.add("MatMul", f"white_{j}", step, matrix)
         total = graph.row_sums(graph.add("Mul", f"square_{j}", white, white), f"distance_{j}")
         offset = graph.constant(f"offset_{j}", density.offsets[j : j + 1])
         distances.append(graph.add("Add", f"term_{j}", total, offset))
+        back = graph.constant(f"whitening_back_{j}", whitening)
+        slope = graph.add("MatMul", f"slope_{j}", white, back)
+        curvature = graph.constant(f"curvature_{j}", np.sum(whitening**2, axis=0))
+        square = graph.add("Mul", f"slope_square_{j}", slope, slope)
+        reliefs.append(graph.add("Div", f"relief_{j}", square, curvature))
     least = graph.add("Min", "least_term", *distances)
     threshold = graph.constant("threshold", np.array([density.threshold]))
-    return graph.add("Div", "domain_score", least, threshold)
+    graph.add("Div", "domain_score", least, threshold)
+    zero = graph.constant("zero", np.zeros(1))
+    chosen = []
+    for j, (distance, relief) in enumerate(zip(distances, reliefs, strict=True)):
+        nearest = graph.column(graph.add("Equal", f"nearest_{j}", distance, least), f"nearest_{j}")
+        chosen.append(graph.add("Where", f"chosen_{j}", nearest, relief, zero))
+    relief = graph.add("Sum", "reliefs", *chosen)
+    most = graph.add("ReduceMax", "most_relief", relief, axes=[1], keepdims=1)
+    bound = graph.add("Mul", "blame_bound", most, graph.constant("blame", np.array([BLAME])))
+    return graph.add("Not", "blamed", graph.add("Less", "minor", relief, bound))
 
 
 def _of(columns: Sequence[Column | Constraint], attribute: str) -> Floats:
@@ -274,7 +311,7 @@ def run_onnx(model: bytes, numeric: Floats, index: NDArray[np.int64]) -> Floats:
     return run_onnx_rows(model, numeric, index).values
 
 
-def run_onnx_rows(model: bytes, numeric: Floats, index: NDArray[np.int64]) -> RowPredictions:
+def run_onnx_rows(model: bytes, numeric: Floats, index: NDArray[np.int64]) -> Answers:
     """Evaluate an ONNX file: with onnxruntime on one thread, or with the reference of ONNX.
 
     Parameters
@@ -301,7 +338,8 @@ def run_onnx_rows(model: bytes, numeric: Floats, index: NDArray[np.int64]) -> Ro
         np.stack([found[f"{name}{ending}"] for name in outputs], axis=1)
         for ending in ("", "_lower", "_upper")
     )
-    return RowPredictions(values, lower, upper, found["domain_score"], found["in_domain"])
+    score, inside, offending = (found[name] for name in ("domain_score", "in_domain", "offending"))
+    return Answers(values, lower, upper, score, inside, offending)
 
 
 def _reference_columns(

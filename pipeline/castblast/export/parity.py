@@ -7,23 +7,21 @@ band, the density score and the domain flag of a copy are held against those of 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from castblast.export.json_file import from_json
-from castblast.export.onnx_file import run_onnx_rows
+from castblast.export.answers import Answers, NotVerifiedError
+from castblast.export.plain import Files
+from castblast.export.targets import TARGETS
 from castblast.network import (
-    Floats,
     Network,
-    RowPredictions,
     density_score,
     explosive_index,
     in_domain,
-    predict_rows,
+    offending_inputs,
 )
 
 #: Largest relative deviation allowed for a float64 export.
@@ -55,6 +53,10 @@ class ParityReport:
         Largest deviation of the density score, over the larger of the score and 1.
     flags : int
         Rows whose domain flag differs.
+    names : int
+        Rows in which other inputs are named as offending.
+    tool : str
+        What it was run with.
     """
 
     target: str
@@ -66,6 +68,8 @@ class ParityReport:
     band: float = 0.0
     score: float = 0.0
     flags: int = 0
+    names: int = 0
+    tool: str = ""
 
     @property
     def verified(self) -> bool:
@@ -90,11 +94,19 @@ class ParityReport:
         ]
         if self.flags:
             lines.append(f"the domain flag differs in {self.flags} of {self.rows} rows")
+        if self.names:
+            lines.append(f"other inputs are named in {self.names} of {self.rows} rows")
         return lines
+
+    @property
+    def largest(self) -> float:
+        """Largest relative deviation of values and bands; NaN if not run."""
+        return max(self.band, *self.relative.values()) if self.verified else float("nan")
 
     def to_document(self) -> dict[str, Any]:
         """Give the report as plain JSON values."""
         return {
+            "status": ("passed" if self.passed else "failed") if self.verified else self.remark,
             "passed": self.passed,
             "verified": self.verified,
             "golden_rows": self.rows,
@@ -104,46 +116,38 @@ class ParityReport:
             "band": self.band,
             "density_score": self.score,
             "flags_that_differ": self.flags,
-            **({"remark": self.remark} if self.remark else {}),
+            "names_that_differ": self.names,
+            "tool": self.tool,
         }
 
 
-Runner = Callable[[bytes, Floats, NDArray[np.int64]], RowPredictions | None]
-
-
-def _run_json(contents: bytes, numeric: Floats, index: NDArray[np.int64]) -> RowPredictions:
-    return predict_rows(from_json(contents.decode()), numeric, index)
-
-
-#: How each export is run: file contents and rows in, outputs out; None if that cannot be done here.
-RUNNERS: dict[str, tuple[Runner, str]] = {
-    "json": (_run_json, ""),
-    "onnx": (run_onnx_rows, ""),
-}
-
-
-def check_parity(network: Network, target: str, contents: bytes) -> ParityReport:
-    """Run an exported file on the golden rows of its network.
+def check_parity(network: Network, target: str, files: Files) -> ParityReport:
+    """Run exported files on the golden rows of their network.
 
     Parameters
     ----------
     network : Network
         What was exported; its golden rows are the truth.
     target : str
-        A key of `RUNNERS`.
-    contents : bytes
-        The exported file.
+        A key of `TARGETS`.
+    files : mapping of name to bytes
+        What the writer of the target gave.
+
+    Raises
+    ------
+    CheckError
+        A file does not compile or run at all.
     """
-    runner, remark = RUNNERS[target]
     golden = network.golden
     index = np.array([explosive_index(network, name) for name in golden.explosives], dtype=np.int64)
-    found = runner(contents, golden.inputs, index)
-    if found is None:
-        return ParityReport(target, 0, {}, {}, remark=remark)
-    return compare_outputs(network, target, found)
+    try:
+        found, tool = TARGETS[target].run(network, files, golden.inputs, index)
+    except NotVerifiedError as reason:
+        return ParityReport(target, 0, {}, {}, remark=f"not verified: {reason}")
+    return replace(compare_outputs(network, target, found), tool=tool)
 
 
-def compare_outputs(network: Network, target: str, found: RowPredictions) -> ParityReport:
+def compare_outputs(network: Network, target: str, found: Answers) -> ParityReport:
     """Hold the answers for the golden rows against the stored ones and their band and domain."""
     truth, names = network.golden.outputs, network.output_names
     deviation = np.abs(found.values - truth)
@@ -153,6 +157,7 @@ def compare_outputs(network: Network, target: str, found: RowPredictions) -> Par
     score = density_score(network, network.golden.inputs)
     drift = np.abs(found.score - score) / np.maximum(score, 1.0)
     inside = in_domain(network, network.golden.inputs)
+    offending = offending_inputs(network, network.golden.inputs)
     return ParityReport(
         target,
         len(truth),
@@ -161,4 +166,5 @@ def compare_outputs(network: Network, target: str, found: RowPredictions) -> Par
         band=float((band / size).max()),
         score=0.0 if network.density is None else float(drift.max()),
         flags=int(np.count_nonzero(found.inside != inside)),
+        names=int(np.count_nonzero(np.any(found.offending != offending, axis=1))),
     )

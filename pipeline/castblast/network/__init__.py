@@ -5,6 +5,7 @@ It knows no training library; NumPy alone evaluates it.
 """
 
 from castblast.network.domain import (
+    BLAME,
     DomainKind,
     DomainViolation,
     density_reliefs,
@@ -12,6 +13,7 @@ from castblast.network.domain import (
     domain_faults,
     domain_violations,
     in_domain,
+    offending_inputs,
     scale_columns,
 )
 from castblast.network.evaluate import (
@@ -39,6 +41,7 @@ from castblast.network.record import (
 from castblast.network.terms import SCHEMA_VERSION, Activation, Floats, Transform
 
 __all__ = [
+    "BLAME",
     "SCHEMA_VERSION",
     "Activation",
     "Column",
@@ -65,6 +68,7 @@ __all__ = [
     "explosive_index",
     "in_domain",
     "member_spread",
+    "offending_inputs",
     "predict_rows",
     "run_layers",
     "scale_columns",

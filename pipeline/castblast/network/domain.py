@@ -15,7 +15,7 @@ from castblast.network.terms import Floats
 #: network cannot see was given.
 DomainKind = Literal["box", "rule", "density", "unseen"]
 #: Inputs whose free choice would lower the score by this share of the best such choice are named.
-_BLAME = 0.5
+BLAME = 0.5
 
 
 class DomainViolation(NamedTuple):
@@ -83,6 +83,25 @@ def in_domain(network: Network, numeric: Floats) -> NDArray[np.bool_]:
     return inside
 
 
+def offending_inputs(network: Network, numeric: Floats) -> NDArray[np.bool_]:
+    """Inputs that `domain_violations` names, for rows of SI inputs (n, k): (n, k) bool."""
+    lower = np.array([column.lower for column in network.inputs])
+    upper = np.array([column.upper for column in network.inputs])
+    named: NDArray[np.bool_] = ~((numeric >= lower) & (numeric <= upper))
+    columns = dict(zip(network.input_names, numeric.T, strict=True))
+    for rule in network.constraints:
+        with np.errstate(invalid="ignore"):
+            broken = ~(rule.margin(columns) >= 0.0)
+        involved = np.array([name in rule.coefficients for name in network.input_names])
+        named |= broken[:, None] & involved
+    if network.density is not None:
+        unusual = ~named.any(axis=1) & ~(density_score(network, numeric) <= 1.0)
+        reliefs = density_reliefs(network, numeric[unusual])
+        most = np.max(reliefs, axis=1, keepdims=True, initial=0.0)
+        named[unusual] = ~(reliefs < BLAME * most)
+    return named
+
+
 def domain_violations(network: Network, row: Mapping[str, float]) -> list[DomainViolation]:
     """Give every reason why one row of SI inputs lies outside the training domain.
 
@@ -121,7 +140,7 @@ def _density_violation(
     named = tuple(
         name
         for name, relief in zip(network.input_names, reliefs, strict=True)
-        if not relief < _BLAME * np.max(reliefs)
+        if not relief < BLAME * np.max(reliefs)
     )
     values = ", ".join(f"{name} = {shown[name]}" for name in named)
     message = (

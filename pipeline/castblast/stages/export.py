@@ -3,29 +3,25 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from castblast.errors import CheckError, SpecError, nearest_name
-from castblast.export.json_file import read_network, to_json
+from castblast.export.json_file import read_network
 from castblast.files import write_text, write_with
 from castblast.network import Network
+from castblast.progress import ProgressCallback, silent
+
+if TYPE_CHECKING:
+    from castblast.export.parity import ParityReport
 
 
-def _onnx(network: Network) -> bytes:
-    from castblast.export.onnx_file import to_onnx
-
-    return to_onnx(network)
-
-
-#: Target to file name and writer.
-_WRITERS: dict[str, tuple[str, Callable[[Network], bytes]]] = {
-    "json": ("network.json", lambda network: to_json(network).encode()),
-    "onnx": ("model.onnx", _onnx),
-}
+#: Every target; `all` stands for them together.
+TARGET_NAMES = ("json", "onnx", "c", "js", "python", "pfc", "lammps", "excel")
 
 
 @dataclass(frozen=True)
@@ -44,6 +40,7 @@ def export(
     targets: Sequence[str] = ("json", "onnx"),
     verify: bool = True,
     parity: Path | None = None,
+    progress: ProgressCallback = silent,
 ) -> ExportOutcome:
     """Write the network of a fit.
 
@@ -54,34 +51,68 @@ def export(
     out : path, optional
         Folder for the files; default ``export`` beside the fit.
     targets : sequence of str
-        Any of ``json``, ``onnx``.
+        Any of `TARGET_NAMES`, or ``all``.
     verify : bool
-        Run every file on the golden rows first; nothing is written if one disagrees.
+        Run every file on the golden rows first; nothing is written if one disagrees. What cannot
+        be run here, for want of a compiler say, is written and said to be not verified.
     parity : path, optional
         Where to write the deviations found (JSON).
 
     Raises
     ------
     SpecError
-        No usable network, an unknown target.
+        No usable network, an unknown target, a folder that cannot be written.
     CheckError
         A file that does not give the answers of the fitted estimator.
     """
     wanted = _targets(targets)
     source = find_network(fit)
     network = read_network(source)
-    contents = {target: _WRITERS[target][1](network) for target in wanted}
-    reports = _verify(network, contents) if verify else {}
     folder = source.parent / "export" if out is None else out
+    _require_writable(folder)
+    contents = _write(network, wanted)
+    reports = _verify(network, contents, progress) if verify else {}
     files, lines = [], []
-    for target, content in contents.items():
-        path = folder / _WRITERS[target][0]
-        files.append(write_with(path, partial(_write_bytes, content=content)))
-        lines.append(f"wrote {path} ({len(content) / 1000:.1f} kB){_verdict(reports.get(target))}")
+    for name, content in {k: v for part in contents.values() for k, v in part.items()}.items():
+        files.append(write_with(folder / name, partial(_write_bytes, content=content)))
+    for target, part in contents.items():
+        size = sum(map(len, part.values())) / 1000
+        line = f"{target}: {', '.join(part)} ({size:.1f} kB){_verdict(reports.get(target))}"
+        lines.append(line)
+    lines.append(f"wrote {len(files)} files to {folder}")
+    documents = {target: report.to_document() for target, report in reports.items()}
     if parity is not None:
-        files.append(write_text(parity, json.dumps(reports, indent=2) + "\n"))
-    document = {"network": str(source), "files": [str(path) for path in files], "parity": reports}
+        files.append(write_text(parity, json.dumps(documents, indent=2) + "\n"))
+    document = {"network": str(source), "files": [str(path) for path in files], "parity": documents}
     return ExportOutcome(document, lines, files)
+
+
+def _write(network: Network, wanted: Sequence[str]) -> dict[str, dict[str, bytes]]:
+    """Files of every target, all faults at once."""
+    from castblast.export.targets import TARGETS
+
+    contents, faults = {}, []
+    for target in wanted:
+        try:
+            contents[target] = TARGETS[target].write(network)
+        except SpecError as fault:
+            faults.append(str(fault))
+    if faults:
+        raise SpecError("\n".join(faults))
+    return contents
+
+
+def _require_writable(folder: Path) -> None:
+    """Say that nothing can be written before minutes are spent on making it."""
+    place = folder
+    while not place.exists() and place != place.parent:
+        place = place.parent
+    if not place.is_dir():
+        message = f"{folder}: cannot be written, {place} is a file"
+        raise SpecError(message)
+    if not os.access(place, os.W_OK | os.X_OK):
+        message = f"{folder}: cannot be written, no permission to write in {place}"
+        raise SpecError(message)
 
 
 def _write_bytes(path: Path, content: bytes) -> None:
@@ -119,47 +150,59 @@ def find_network(fit: Path) -> Path:
 
 def _targets(targets: Sequence[str]) -> list[str]:
     wanted = list(dict.fromkeys(target.strip() for target in targets if target.strip()))
-    for engine in ("lammps", "liggghts"):
-        if {engine, f"{engine}-deck"} & set(wanted):
-            raise SpecError(
-                f"export target '{engine}': a bench is written for {engine.upper()} by "
-                f"castblast muckpile BENCH --{engine} DIR; a network is exported to "
-                f"{' or '.join(_WRITERS)}"
-            )
-    faults = [
-        f"export target '{target}': not known{nearest_name(target, _WRITERS)} "
-        f"(there are {', '.join(_WRITERS)})"
-        for target in wanted
-        if target not in _WRITERS
-    ]
+    if wanted == ["all"]:
+        return list(TARGET_NAMES)
+    known = (*TARGET_NAMES, "all")
+    faults = [_unknown(target) for target in wanted if target not in TARGET_NAMES]
     if not wanted:
-        faults.append(f"no export target given (there are {', '.join(_WRITERS)})")
+        faults.append(f"no export target given (there are {', '.join(known)})")
     if faults:
         raise SpecError("\n".join(faults))
     return wanted
 
 
-def _verify(network: Network, contents: dict[str, bytes]) -> dict[str, Any]:
+def _unknown(target: str) -> str:
+    if target == "all":
+        return "export target 'all': stands alone"
+    engine = target.removesuffix("-deck")
+    if engine in ("lammps", "liggghts"):
+        return (
+            f"export target '{target}': a bench is written for {engine.upper()} by castblast "
+            f"muckpile BENCH --{engine} DIR; a network is exported to {', '.join(TARGET_NAMES)}"
+        )
+    known = (*TARGET_NAMES, "all")
+    hint = nearest_name(target, known)
+    return f"export target '{target}': not known{hint} (there are {', '.join(known)})"
+
+
+def _verify(
+    network: Network, contents: Mapping[str, dict[str, bytes]], progress: ProgressCallback
+) -> dict[str, ParityReport]:
+    """Run every target on the golden rows; all disagreements at once."""
     from castblast.export.parity import check_parity
 
-    reports = {
-        target: check_parity(network, target, content) for target, content in contents.items()
-    }
-    faults = [
-        f"{target}: {line}"
-        for target, report in reports.items()
-        if report.verified
-        for line in report.faults
-    ]
+    reports, faults = {}, []
+    for number, (target, files) in enumerate(contents.items()):
+        progress(number / len(contents), f"running {target}")
+        try:
+            report = check_parity(network, target, files)
+        except CheckError as fault:
+            faults.append(f"{target}: {fault}")
+            continue
+        reports[target] = report
+        if report.verified:
+            faults += [f"{target}: {line}" for line in report.faults]
     if faults:
         raise CheckError("\n".join(faults))
-    return {target: report.to_document() for target, report in reports.items()}
+    return reports
 
 
-def _verdict(report: dict[str, Any] | None) -> str:
+def _verdict(report: ParityReport | None) -> str:
     if report is None:
         return ""
-    if not report["verified"]:
-        return f"; {report['remark']}"
-    worst = max(report["relative"].values())
-    return f"; {report['golden_rows']} golden rows, largest relative deviation {worst:.1e}"
+    if not report.verified:
+        return f"; {report.remark}"
+    return (
+        f"; {report.rows} golden rows in {report.tool}, largest relative deviation "
+        f"{report.largest:.1e}"
+    )

@@ -1,0 +1,199 @@
+"""A network as the writers of source code need it: positions for names, one layout for all.
+
+Every language gets the same numbers in the same order, so that copies can differ only in how they
+compute. Texts are plain ASCII: sources are read by compilers and interpreters of any age.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from castblast.export.json_file import pretty
+from castblast.network import (
+    BLAME,
+    Column,
+    Floats,
+    Layer,
+    Network,
+    density_score,
+    explosive_index,
+    in_domain,
+)
+from castblast.variables import STEMMING_RATIO, VARIABLES
+
+#: Files of one export: name to contents.
+Files = dict[str, bytes]
+_TEMPLATES = Path(__file__).parent / "templates"
+
+
+def compact(network: Network) -> dict[str, Any]:
+    """Give a network as plain values with names replaced by positions.
+
+    Weights are (n_in, n_out); derived coefficients run over all inputs; rules are pairs of
+    position and coefficient in the order in which they are summed; golden explosives are
+    positions. Members are left out: they give no value.
+    """
+    names = network.input_names
+    golden, density = network.golden, network.density
+    example = dict(zip(names, example_row(network), strict=True))
+    return {
+        "model": identity(network),
+        "inputs": [
+            _column(c) | {"lower": c.lower, "upper": c.upper, "example": example[c.name]}
+            for c in network.inputs
+        ],
+        "derived": [
+            _column(c) | {"coefficients": [float(c.coefficients.get(name, 0.0)) for name in names]}
+            for c in network.derived
+        ],
+        "explosives": list(network.explosives),
+        "codes": network.codes.tolist(),
+        "layers": [_layer(layer) for layer in network.layers],
+        "outputs": [_column(c) | {"band": c.relative_band} for c in network.outputs],
+        "rules": [
+            {
+                "label": rule.label,
+                "terms": [[names.index(name), float(c)] for name, c in rule.coefficients.items()],
+                "lower": float(rule.lower),
+            }
+            for rule in network.constraints
+        ],
+        "density": None
+        if density is None
+        else {
+            "centres": density.centres.tolist(),
+            "whitening": density.whitening.tolist(),
+            "offsets": density.offsets.tolist(),
+            "threshold": float(density.threshold),
+            "level": float(density.level),
+            "blame": BLAME,
+        },
+        "golden": {
+            "explosives": [explosive_index(network, name) for name in golden.explosives],
+            "inputs": golden.inputs.tolist(),
+            "outputs": golden.outputs.tolist(),
+        },
+    }
+
+
+def identity(network: Network) -> dict[str, str]:
+    """Name of the model, of its data and of the version that made it, for headers."""
+    spec = network.provenance.get("spec", {})
+    dataset = network.provenance.get("dataset", {})
+    return {
+        "name": str(spec.get("name", "network")),
+        "dataset": f"{dataset.get('name', '?')} {dataset.get('dataset_version', '')}".strip(),
+        "content_sha256": str(dataset.get("content_sha256", "")),
+        "castblast_version": str(network.provenance.get("castblast_version", "")),
+    }
+
+
+def _column(column: Column) -> dict[str, Any]:
+    variable = VARIABLES.get(column.name)
+    return {
+        "name": column.name,
+        "unit": column.unit,
+        "title": variable.long_name if variable else column.name.replace("_", " "),
+        "shown_unit": variable.shown_unit if variable else column.unit,
+        "shown_factor": variable.display_factor if variable else 1.0,
+        "log": column.transform == "log",
+        "mean": float(column.mean),
+        "scale": float(column.scale),
+    }
+
+
+def _layer(layer: Layer) -> dict[str, Any]:
+    return {
+        "activation": layer.activation,
+        "weights": layer.weights.tolist(),
+        "biases": layer.biases.tolist(),
+    }
+
+
+def example_row(network: Network) -> list[float]:
+    """Give one design for usage examples: the usual one, or the least unusual golden row."""
+    usual = np.array([_usual_values(network)])
+    if in_domain(network, usual)[0]:
+        return [float(value) for value in usual[0]]
+    rows: Floats = network.golden.inputs
+    rows = rows[in_domain(network, rows)] if len(rows) else rows
+    if not len(rows):
+        return [0.5 * (column.lower + column.upper) for column in network.inputs]
+    chosen = 0 if network.density is None else int(density_score(network, rows).argmin())
+    return [float(value) for value in rows[chosen]]
+
+
+def _usual_values(network: Network) -> list[float]:
+    """Defaults of the variables; hole and charge as the tools of castblast complete them."""
+    full = {n: v.default for n, v in VARIABLES.items() if v.default is not None}
+    full["spacing"], full["charge_diameter"] = full["burden"], full["hole_diameter"]
+    full["stemming_length"] = STEMMING_RATIO * full["burden"]
+    full["charge_length"] = full["bench_height"] - full["stemming_length"]
+    middle = {c.name: 0.5 * (c.lower + c.upper) for c in network.inputs}
+    return [full.get(name, middle[name]) for name in network.input_names]
+
+
+def render(template: str, **values: Any) -> bytes:
+    """Fill a template of `export/templates` and give it as ASCII bytes with Unix line ends."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FileSystemLoader(_TEMPLATES),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+    environment.filters |= {
+        "number": _number,
+        "braces": _braces,
+        "quoted": quoted,
+        "comment": _comment,
+        "identifier": identifier,
+        "pretty": pretty,
+    }
+    text = environment.get_template(template).render(**values)
+    return text.encode("ascii", "backslashreplace")
+
+
+def _number(value: float) -> str:
+    """Shortest text that reads back to the same float64, in C, JavaScript and Python alike."""
+    return repr(float(value))
+
+
+def _braces(values: Sequence[Any], indent: str = "  ") -> str:
+    """C initialiser of nested lists of numbers; lines of at most 100 characters."""
+    if isinstance(values[0], list):
+        return "{\n" + ",\n".join(indent + _braces(row, indent + "  ") for row in values) + "}"
+    lines, line = [], ""
+    for text in (repr(value) for value in values):
+        if line and len(indent) + len(line) + len(text) > 96:
+            lines.append(line.rstrip())
+            line = ""
+        line += f"{text}, "
+    lines.append(line.rstrip(", "))
+    return "{" + f"\n{indent} ".join(lines) + "}"
+
+
+def quoted(text: str) -> str:
+    r"""Text as a literal of C, JavaScript or Python: ASCII, no escapes but \" and \\."""
+    plain = text.encode("ascii", "replace").decode()
+    plain = "".join(letter if letter.isprintable() else " " for letter in plain)
+    return '"' + plain.replace("\\", "\\\\").replace('"', '\\"').replace("??", "? ?") + '"'
+
+
+def _comment(text: str) -> str:
+    """Text that cannot end a comment."""
+    plain = "".join(letter if letter.isprintable() else " " for letter in text)
+    return plain.replace("*/", "* /").replace("/*", "/ *").replace("\\", "/")
+
+
+def identifier(name: str) -> str:
+    """Name as part of an identifier, upper case."""
+    return re.sub(r"[^A-Za-z0-9]", "_", name).upper()

@@ -1,0 +1,25 @@
+// Answers rows from standard input with the module given; run by `castblast export --verify`.
+import { readFileSync } from "node:fs";
+import { pathToFileURL } from "node:url";
+
+const [path, count] = process.argv.slice(2);
+const { network, predictRow } = await import(pathToFileURL(path));
+if (count !== undefined) {
+  const { explosives, inputs } = network.golden;
+  let sum = 0;
+  const start = performance.now();
+  for (let i = 0; i < Number(count); i += 1) {
+    const k = i % inputs.length;
+    sum += predictRow(explosives[k], inputs[k]).values[0];
+  }
+  console.log((performance.now() - start) / 1000 + 0 * sum);
+} else {
+  const domains = ["inside", "unusual", "outside"];
+  const lines = readFileSync(0, "utf8").trim().split("\n").map((line) => {
+    const [explosive, ...row] = line.split(" ").map(Number);
+    const { values, lower, upper, score, domain, offending } = predictRow(explosive, row);
+    const flags = offending.map((flag) => (flag ? 1 : 0));
+    return [...values, ...lower, ...upper, score, domains.indexOf(domain), ...flags].join(" ");
+  });
+  console.log(lines.join("\n"));
+}
