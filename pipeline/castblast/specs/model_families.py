@@ -61,6 +61,8 @@ class LevenbergSpec(RandomStarts):
     start_rows, start_iterations : int
         A fit starts on so many random training rows, with at most so many accepted steps, where
         they cost less; without effect where there are not 1.5 times as many rows.
+    starts : int
+        Random weights that are tried so; what has the lowest objective goes on.
     max_iterations : int
         Further steps on all rows; reaching it is recorded, not an error.
     tolerance : float
@@ -77,6 +79,7 @@ class LevenbergSpec(RandomStarts):
     penalty: float = Field(0.0, ge=0.0)
     start_rows: int = Field(2500, ge=10)
     start_iterations: int = Field(100, ge=1)
+    starts: int = Field(1, ge=1, le=20)
     max_iterations: int = Field(40, ge=1)
     tolerance: float = Field(2e-2, ge=0.0, lt=1.0)
     per_explosive: bool = False
@@ -93,6 +96,7 @@ class LevenbergSpec(RandomStarts):
         """One start, half the nodes, at most 40 and 10 steps."""
         fewer = {
             "restarts": 1,
+            "starts": 1,
             "hidden_layers": tuple((width + 1) // 2 for width in self.hidden_layers),
             "start_iterations": min(self.start_iterations, 40),
             "max_iterations": min(self.max_iterations, 10),

@@ -64,6 +64,8 @@ class LevenbergMlp(ChainRegressor):
     penalty : float
     start_rows, start_iterations : int
         A fit starts with so many steps on so many random rows, where they cost less.
+    starts : int
+        Random weights to start from; the lowest objective after the first steps goes on.
     max_iterations : int
         Then so many steps on all rows.
     tolerance : float
@@ -72,7 +74,7 @@ class LevenbergMlp(ChainRegressor):
     categories : int
         Above 0: the last so many columns are a one-hot code, and each category has a network.
     random_state : int
-        Of the random weights; target number j takes ``random_state + 1000 j``.
+        Of the random weights, with the numbers of target and start.
 
     Attributes
     ----------
@@ -90,6 +92,7 @@ class LevenbergMlp(ChainRegressor):
         penalty: float = 0.0,
         start_rows: int = 2500,
         start_iterations: int = 100,
+        starts: int = 1,
         max_iterations: int = 40,
         tolerance: float = 1e-3,
         columns: Sequence[Sequence[int]] | None = None,
@@ -101,6 +104,7 @@ class LevenbergMlp(ChainRegressor):
         self.penalty = penalty
         self.start_rows = start_rows
         self.start_iterations = start_iterations
+        self.starts = starts
         self.max_iterations = max_iterations
         self.tolerance = tolerance
         self.columns = columns
@@ -118,32 +122,36 @@ class LevenbergMlp(ChainRegressor):
 
     def _fit_target(self, x: Floats, y: Floats, number: int) -> Chain:
         seen = range(x.shape[1]) if self.columns is None else self.columns[number]
-        seed = self.random_state + 1000 * number
         if not self.categories:
-            return embed(self._fit_rows(x[:, list(seen)], y, seed), seen, x.shape[1])
+            return embed(self._fit_rows(x[:, list(seen)], y, number), seen, x.shape[1])
         numbers = x.shape[1] - self.categories
         seen = [column for column in seen if column < numbers]
         chains = []
         for k in range(self.categories):
             rows = x[:, numbers + k] > 0.5
-            chains.append(embed(self._fit_rows(x[rows][:, seen], y[rows], seed), seen, numbers))
+            chains.append(embed(self._fit_rows(x[rows][:, seen], y[rows], number), seen, numbers))
         return one_for_each(chains)
 
-    def _fit_rows(self, x: Floats, y: Floats, seed: int) -> Chain:
-        """Fit one network, on some of the rows first if there are many more."""
-        steps, start = self.start_iterations + self.max_iterations, None
+    def _fit_rows(self, x: Floats, y: Floats, number: int) -> Chain:
+        """Fit one network: first steps, on some of the rows if there are many more, then all."""
+        rows: Any = slice(None)
         if len(y) > 1.5 * self.start_rows:
-            rows = np.random.default_rng(seed).permutation(len(y))[: self.start_rows]
-            first = self._levenberg(x[rows], y[rows], self.start_iterations, seed, None)
-            steps, start = self.max_iterations, first.weights
-            self.n_iter_ += first.steps
-        result = self._levenberg(x, y, steps, seed, start)
-        self.n_iter_ += result.steps
+            order = np.random.default_rng([self.random_state, number]).permutation(len(y))
+            rows = order[: self.start_rows]
+        firsts = [
+            self._levenberg(
+                x[rows], y[rows], self.start_iterations, [self.random_state, number, start], None
+            )
+            for start in range(self.starts)
+        ]
+        best = min(firsts, key=lambda first: first.objective)
+        result = self._levenberg(x, y, self.max_iterations, 0, best.weights)
+        self.n_iter_ += sum(first.steps for first in firsts) + result.steps
         self.converged_ &= result.converged
         return result.layers
 
     def _levenberg(
-        self, x: Floats, y: Floats, steps: int, seed: int, start: Floats | None
+        self, x: Floats, y: Floats, steps: int, seed: int | Sequence[int], start: Floats | None
     ) -> LevenbergResult:
         return fit_dense(
             np.ascontiguousarray(x),

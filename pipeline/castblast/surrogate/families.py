@@ -87,6 +87,7 @@ def _levenberg(spec: LevenbergSpec, table: Table, seed: int) -> Any:
         penalty=spec.penalty,
         start_rows=spec.start_rows,
         start_iterations=spec.start_iterations,
+        starts=spec.starts,
         max_iterations=spec.max_iterations,
         tolerance=spec.tolerance,
         columns=tuple(tuple(seen_columns(spec, name, codes)) for name in spec.targets),

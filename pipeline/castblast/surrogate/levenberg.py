@@ -43,15 +43,15 @@ class LevenbergResult(NamedTuple):
         Accepted ones.
     converged : bool
         Ended by its own rule, not at the limit of steps.
-    mean_square : float
-        Of the residuals.
+    objective : float
+        Sum of squared residuals with the penalty.
     """
 
     layers: tuple[Layer, ...]
     weights: Floats
     steps: int
     converged: bool
-    mean_square: float
+    objective: float
 
 
 def fit_dense(
@@ -63,7 +63,7 @@ def fit_dense(
     penalty: float,
     max_steps: int,
     tolerance: float,
-    seed: int,
+    seed: int | Sequence[int],
     start: Floats | None = None,
 ) -> LevenbergResult:
     """Fit a dense network to rows.
@@ -82,7 +82,7 @@ def fit_dense(
     max_steps : int
     tolerance : float
         Relative fall of the objective over ten steps at which the fit ends.
-    seed : int
+    seed : int or sequence of int
         Of the random weights at the start.
     start : (P,), optional
         Weights of an earlier fit of the same network, taken in place of random ones.
@@ -116,8 +116,7 @@ def fit_dense(
         )
         if not converged and len(history) <= max_steps:
             matrix, gradient, square = net.normal_equations(weights)
-    mean_square = net.square(weights) / len(y)
-    return LevenbergResult(net.layers(weights), weights, len(history) - 1, converged, mean_square)
+    return LevenbergResult(net.layers(weights), weights, len(history) - 1, converged, objective)
 
 
 def _solve(matrix: Floats, slope: Floats, shift: float) -> Floats | None:
