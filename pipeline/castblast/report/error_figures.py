@@ -8,7 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from castblast.report.style import CYCLE, in_style, new_figure, plain_log_ticks, save_figure, words
+from castblast.report.style import (
+    CYCLE,
+    in_style,
+    new_figure,
+    plain_log_ticks,
+    save_figure,
+    with_unit,
+    words,
+)
 from castblast.variables import VARIABLES
 
 Document = Mapping[str, Any]
@@ -54,7 +62,7 @@ def _draw_plane(axis: Any, plane: Document, error: Any, most: float) -> Any:
         edges = plane["across_edges" if side is axis.xaxis else "up_edges"]
         shown = [f"{edge * variable.display_factor:.3g}" for edge in edges]
         side.set_ticks(range(len(edges)), shown, fontsize=7)
-        side.set_label_text(f"{words(name)} [{variable.shown_unit}]")
+        side.set_label_text(with_unit(name))
     axis.grid(visible=False)
     return shades
 
@@ -82,7 +90,7 @@ def draw_strata(path: Path, title: str, strata: Document) -> Path:
             errors = [_percent(c["targets"][target]["relative_error_95"]) for c in cells]
             axis.plot(middle, errors, "o-", markersize=2.5, linewidth=1.2, color=colour,
                       label=words(target))  # fmt: skip
-        axis.set_xlabel(f"{words(name)} [{variable.shown_unit}]", fontsize=8)
+        axis.set_xlabel(with_unit(name), fontsize=8)
         axis.set_yscale("log")
         plain_log_ticks(axis.yaxis)
     for axis in axes.ravel()[len(inputs) :]:

@@ -46,7 +46,7 @@ def draw_league(path: Path, comparison: Document) -> Path:
         _draw_target(axis, comparison, target)
     labels = [_label(entry, comparison) for entry in league]
     axes[0, 0].set_yticks(range(len(league)), labels)
-    axes[0, 0].invert_yaxis()
+    axes[0, 0].set_ylim(len(league) - 0.5, -0.5)
     for tick, entry in zip(axes[0, 0].get_yticklabels(), league, strict=True):
         tick.set_fontweight("bold" if entry["name"] == comparison["chosen"] else "normal")
         tick.set_color(RED if entry["gate_passed"] is False else "black")

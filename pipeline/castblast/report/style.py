@@ -12,6 +12,7 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from castblast.files import write_with
+from castblast.variables import VARIABLES
 
 #: Colours that stay apart for colour-blind readers (Okabe & Ito 2008).
 BLUE, ORANGE, GREEN, RED, PURPLE, SKY, YELLOW, GREY = (
@@ -63,6 +64,12 @@ def save_figure(figure: Figure, path: Path, *, dpi: int = 150) -> Path:
 def words(name: str) -> str:
     """Name of a variable as words."""
     return name.replace("_", " ")
+
+
+def with_unit(name: str) -> str:
+    """Name of a variable as words, with the unit for people unless it has none."""
+    unit = VARIABLES[name].shown_unit
+    return words(name) if unit == "1" else f"{words(name)} [{unit}]"
 
 
 def plain_log_ticks(axis: Any) -> None:

@@ -208,6 +208,8 @@ def _sign_checks(surrogate: Surrogate, probe: Probe) -> Iterator[dict[str, Any]]
         if direction.sign == 0:
             continue
         verb = "rises" if direction.sign > 0 else "falls"
+        if np.any(dense.sign * direction.sign < 0.0):
+            verb = "goes by the powder factor"
         name = f"{VELOCITY} {verb} with {direction.name}"
         held = f"held: {direction.held}" if direction.held else "all else held"
         if not pairs.kept:
