@@ -72,6 +72,11 @@ class Extent:
     sobol_rows: int = 8192
     checked_rows: int = 1024
 
+    @property
+    def suffix(self) -> str:
+        """What folders of another extent than the full one end in."""
+        return "" if self.name == "full" else f"_{self.name}"
+
     def stated(self) -> dict[str, Any]:
         """What was left out, as plain JSON values."""
         return {**vars(self), "curve_sizes": list(self.curve_sizes)}
@@ -176,37 +181,43 @@ def compare(
         An unusable dataset.
     """
     from castblast.dataset.store import open_dataset, require_writable
-    from castblast.stages.compare_report import outcome, write_comparison
+    from castblast.stages.compare_report import comparison_document, outcome, write_comparison
 
     started = time.perf_counter()
-    if dataset.is_dir():
-        fits = dataset if fits is None else fits
-        dataset, wanted = kept_fits(dataset)
-        wanted = _read_specs(specs) if specs else wanted
-    else:
-        wanted = _read_specs(specs)
-    if extent.quick_specs:
-        wanted = [spec.quick() for spec in wanted]
+    dataset, wanted, fits = _sources(dataset, specs, fits, extent)
     table = read_rows(open_dataset(dataset), wanted, dataset)
     if extent.train_rows is not None:
         table = table.with_train_rows(extent.train_rows)
-    suffix = "" if extent is FULL else f"_{extent.name}"
-    fits = dataset.parent / f"fits{suffix}" if fits is None else fits
-    out = dataset.parent / f"comparison{suffix}" if out is None else out
+    out = dataset.parent / f"comparison{extent.suffix}" if out is None else out
     for folder in (fits, out, runs) if tracking else (fits, out):
         require_writable(folder)
     note_dataset(fits, dataset)
     made = fit_all(wanted, table, fits, workers=workers, progress=part(progress, 0.0, 0.5))
     found = _judge(made, table, dataset, fits, extent, workers, part(progress, 0.5, 0.95))
     progress(0.95, "writing the report")
-    files = write_comparison(out, found, time.perf_counter() - started)
+    document = comparison_document(found)
+    files = write_comparison(out, found, document, time.perf_counter() - started)
     if tracking:
         from castblast.surrogate.tracking import MlflowTracker
 
         kept = {fit.spec.name: fit_files(fits / fit.spec.name) for fit in made}
         MlflowTracker(runs).record_comparison(made, found.league, {**kept, "": files}, found.curves)
-    progress(1.0, f"chosen: {found.chosen.spec.name}")
-    return outcome(found, out)
+    progress(1.0, f"chosen: {found.league['chosen'] or 'none'}")
+    return outcome(found, document, out)
+
+
+def _sources(
+    dataset: Path, specs: Sequence[Path], fits: Path | None, extent: Extent
+) -> tuple[Path, list[ModelSpec], Path]:
+    """Dataset, specs and folder of fits; a folder in place of a dataset is one of fits."""
+    if dataset.is_dir():
+        fits = dataset if fits is None else fits
+        dataset, wanted = kept_fits(dataset)
+        wanted = _read_specs(specs) if specs else wanted
+    else:
+        wanted = _read_specs(specs)
+        fits = dataset.parent / f"fits{extent.suffix}" if fits is None else fits
+    return dataset, [spec.quick() if extent.quick_specs else spec for spec in wanted], fits
 
 
 def _read_specs(given: Sequence[Path]) -> list[ModelSpec]:

@@ -18,20 +18,23 @@ if TYPE_CHECKING:
 _HEADLINE = "burden_velocity"
 
 
-def write_comparison(out: Path, found: Comparison, seconds: float) -> list[Path]:
+def write_comparison(
+    out: Path, found: Comparison, document: dict[str, Any], seconds: float
+) -> list[Path]:
     """Write everything into a folder; the files, times last.
 
     Parameters
     ----------
     out : path
     found : Comparison
+    document : dict
+        From `comparison_document`.
     seconds : float
         Wall time of the whole comparison so far.
     """
     from castblast.export.json_file import to_json
     from castblast.surrogate.timing import timings
 
-    document = comparison_document(found)
     files = [write_json(out / "comparison.json", document)]
     for fit in found.fits:
         if fit.spec.name in found.curves:
@@ -145,7 +148,7 @@ def _draw(out: Path, found: Comparison, document: Mapping[str, Any]) -> list[Pat
     return files
 
 
-def outcome(found: Comparison, out: Path) -> TrainOutcome:
+def outcome(found: Comparison, document: Mapping[str, Any], out: Path) -> TrainOutcome:
     """Give what the screen shows of a comparison."""
     league = found.league
     paper = league["paper"]
@@ -170,8 +173,7 @@ def outcome(found: Comparison, out: Path) -> TrainOutcome:
         figures = [f"{paper['r2']:.4f}", f"{paper['relative_error_95']:.1%}"]
         rows.append([f"paper, {paper['runs']:,} runs", "", *figures, *("" for _ in others)])
     title = f"{league['test_rows']:,} test rows never trained on"
-    document = {**comparison_document(found), "out": str(out)}
-    return TrainOutcome(document, title, header, rows, _lines(found, out))
+    return TrainOutcome({**document, "out": str(out)}, title, header, rows, _lines(found, out))
 
 
 def _lines(found: Comparison, out: Path) -> list[str]:

@@ -61,7 +61,6 @@ def tune(
         An unusable dataset.
     """
     from castblast.dataset.store import open_dataset, require_writable
-    from castblast.report.tuning_figures import draw_study
     from castblast.specs.model import read_model_spec
     from castblast.surrogate import tuning
 
@@ -76,21 +75,26 @@ def tune(
     result = tuning.tune(
         wanted, table, journal, trials=trials, timeout=timeout, seed=seed, progress=progress
     )
-    files = [
-        write_json(folder / "study.json", study_document(result)),
-        write_text(folder / f"{result.spec.name}.yaml", spec_text(result)),
-        draw_study(
-            folder / "importance.png",
-            f"{wanted.name}: {len(result.trials)} trials on {table.source.get('name', dataset)}",
-            [(trial.number, trial.error, trial.state) for trial in result.trials],
-            result.importance,
-        ),
-    ]
+    files = _write(folder, result, table.source.get("name", str(dataset)))
     if tracking:
         from castblast.surrogate.tracking import MlflowTracker
 
         MlflowTracker(runs).record_study(result, table.source, files)
     return _outcome(result, folder, journal)
+
+
+def _write(folder: Path, result: StudyResult, dataset: str) -> list[Path]:
+    """Write all trials, the best spec and the picture."""
+    from castblast.report.tuning_figures import draw_study
+
+    picture = draw_study(
+        folder / "importance.png",
+        f"{result.identity['spec']}: {len(result.trials)} trials on {dataset}",
+        [(trial.number, trial.error, trial.state) for trial in result.trials],
+        result.importance,
+    )
+    document = write_json(folder / "study.json", study_document(result))
+    return [document, write_text(folder / f"{result.spec.name}.yaml", spec_text(result)), picture]
 
 
 def study_document(result: StudyResult) -> dict[str, Any]:
