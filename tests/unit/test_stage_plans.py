@@ -61,7 +61,8 @@ def test_shipped_plans_run(name: str, tmp_path: Path) -> None:
     assert document["balls"] == pytest.approx(400, rel=0.06)
     assert document["throw"][0] > 2.0
     assert document["throw"][2] < -1.0
-    assert 0.2 < document["cast_fraction"] < 1.0
+    # The bench of the holes goes over the face line to within a ball or two.
+    assert 0.2 < document["cast_fraction"] <= 1.0
     assert abs(document["ledger"]["residual"]) < 0.02
     if name == "fragments":
         assert 0.0 < document["fragments"]["mass_share_finer"] < 1.0
