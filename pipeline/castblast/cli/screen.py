@@ -55,7 +55,7 @@ class Screen:
 
         table = Table(title=title or None, title_justify="left", box=box.SIMPLE_HEAD)
         for index, name in enumerate(header):
-            table.add_column(name, justify="left" if index == 0 else "right")
+            table.add_column(name, justify="left" if index == 0 else "right", no_wrap=index == 0)
         for row in rows:
             table.add_row(*row)
         Console(width=None if sys.stdout.isatty() else 120).print(table)

@@ -155,7 +155,7 @@ def outcome(found: Comparison, document: Mapping[str, Any], out: Path) -> TrainO
     first = _HEADLINE if _HEADLINE in league["targets"] else league["targets"][0]
     others = [name for name in league["targets"] if name != first]
     shown = [name.replace("_", " ") for name in (first, *others)]
-    header = ["model", "gate", f"{shown[0]}: R²", *(f"{name}: 95 %" for name in shown)]
+    header = ["model", "gate", "export", f"{shown[0]}: R²", *(f"{name}: 95 %" for name in shown)]
     rows = []
     for entry in league["league"]:
         mark = " *" if entry["name"] == league["chosen"] else ""
@@ -164,14 +164,15 @@ def outcome(found: Comparison, document: Mapping[str, Any], out: Path) -> TrainO
         rows.append(
             [
                 entry["name"] + mark,
-                gate if entry["exportable"] else f"{gate}, no export",
+                gate,
+                "yes" if entry["exportable"] else "no",
                 show_r_squared(figures[first]["r2"]),
                 *(show_share(figures[name]["relative_error_95"]) for name in (first, *others)),
             ]
         )
     if paper["target"] == first:
         figures = [f"{paper['r2']:.4f}", f"{paper['relative_error_95']:.1%}"]
-        rows.append([f"paper, {paper['runs']:,} runs", "", *figures, *("" for _ in others)])
+        rows.append([f"paper, {paper['runs']:,} runs", "", "", *figures, *("" for _ in others)])
     title = f"{league['test_rows']:,} test rows never trained on"
     return TrainOutcome({**document, "out": str(out)}, title, header, rows, _lines(found, out))
 

@@ -113,7 +113,7 @@ def _train(demo: Demo, progress: ProgressCallback) -> list[str]:
 
 def _league_line(row: list[str]) -> str:
     """Model, physics gate, R² and 95 % error of the burden velocity."""
-    name, gate, r_squared, error, *_ = row
+    name, gate, _, r_squared, error, *_ = row
     return f"{name:22s} {gate:8s} burden velocity R², 95 % error: {r_squared}, {error}"
 
 
