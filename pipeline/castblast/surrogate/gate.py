@@ -56,11 +56,9 @@ class Surrogate(NamedTuple):
 
     def answers(self, domain: Domain, points: Points) -> dict[str, Floats]:
         """Predictions by target at points of a domain, in blocks."""
-        parts = []
-        for begin in range(0, points.size, _CHUNK):
-            rows = np.arange(begin, min(begin + _CHUNK, points.size))
-            parts.append(self.predict(domain.frame(points.take(rows), self.features)))
-        values = np.concatenate(parts)
+        frame = domain.frame(points, self.features)
+        blocks = [frame.iloc[i : i + _CHUNK] for i in range(0, len(frame), _CHUNK)]
+        values = np.concatenate([self.predict(block) for block in blocks])
         return {name: values[:, j] for j, name in enumerate(self.targets)}
 
 
