@@ -213,14 +213,7 @@ def _add_domain(graph: _Graph, scaled: str, network: Network) -> None:
     )
     faults = graph.add("Not", "box_faults", graph.add("And", "box_kept", above, below))
     if network.constraints:
-        matrix = np.array(
-            [
-                [rule.coefficients.get(name, 0.0) for rule in network.constraints]
-                for name in network.input_names
-            ],
-            dtype=np.float64,
-        )
-        sums = graph.add("MatMul", "rule_sums", "numeric", graph.constant("rules", matrix))
+        sums = _rule_sums(graph, network)
         least = graph.constant("rule_lower", _of(network.constraints, "lower"))
         kept = graph.add("GreaterOrEqual", "rules_kept", sums, least)
         broken = graph.add("Cast", "rules_broken", graph.add("Not", "rule_fault", kept), to=_DOUBLE)
@@ -249,6 +242,19 @@ def _add_domain(graph: _Graph, scaled: str, network: Network) -> None:
     unusual = graph.add("And", "unusual", kept, graph.add("Not", "not_usual", usual))
     together = graph.add("And", "together", graph.column(unusual, "unusual"), blamed)
     graph.add("Or", "offending", faults, together)
+
+
+def _rule_sums(graph: _Graph, network: Network) -> str:
+    """Sums of the rules (n, r), each over its own inputs: NaN elsewhere does not enter."""
+    sums = []
+    for number, rule in enumerate(network.constraints):
+        places = [network.input_names.index(name) for name in rule.coefficients]
+        position = graph.constant(f"rule_{number}_inputs", np.array(places, dtype=np.int64))
+        part = graph.add("Gather", f"rule_{number}_values", "numeric", position, axis=1)
+        column = np.array([[c] for c in rule.coefficients.values()], dtype=np.float64)
+        matrix = graph.constant(f"rule_{number}_coefficients", column)
+        sums.append(graph.add("MatMul", f"rule_{number}_sum", part, matrix))
+    return graph.add("Concat", "rule_sums", *sums, axis=1)
 
 
 def _density(graph: _Graph, scaled: str, density: DensityScore) -> str:

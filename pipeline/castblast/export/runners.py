@@ -8,7 +8,6 @@ does not compile or run raises `CheckError`.
 from __future__ import annotations
 
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -97,19 +96,26 @@ def run_python(
 
 @cache
 def oldest_python() -> tuple[str, str]:
-    """Oldest CPython from 3.6 on that starts here: path and version."""
+    """Oldest CPython from 3.6 on that starts here, of pyenv or on the path: program, version."""
     kept = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv")) / "versions"
-    found = [str(path) for path in kept.glob("3.*/bin/python3")]
-    names = [f"python3.{minor}" for minor in range(OLDEST[1], sys.version_info.minor)]
-    found += [path for name in names if (path := shutil.which(name))]
-    versions = [((sys.version_info.major, sys.version_info.minor), sys.executable)]
-    for path in found:
-        done = subprocess.run([path, "--version"], capture_output=True, text=True, check=False)
-        match = re.fullmatch(r"Python (\d+)\.(\d+)\.\d+", done.stdout.strip())
-        if done.returncode == 0 and match:
-            versions.append(((int(match[1]), int(match[2])), path))
-    (major, minor), path = min(entry for entry in versions if entry[0] >= OLDEST)
-    return path, f"{major}.{minor}"
+    for minor in range(OLDEST[1], sys.version_info.minor):
+        name = f"python3.{minor}"
+        found = [str(path) for path in sorted(kept.glob(f"3.{minor}.*/bin/{name}"))]
+        for program in [*found, shutil.which(name)]:
+            if program and f"Python 3.{minor}." in _version(program):
+                return program, f"3.{minor}"
+    return sys.executable, f"{sys.version_info.major}.{sys.version_info.minor}"
+
+
+def _version(program: str) -> str:
+    """What a program prints as its version; nothing if it does not start."""
+    try:
+        done = subprocess.run(
+            [program, "--version"], capture_output=True, text=True, check=False, timeout=60
+        )
+    except OSError:
+        return ""
+    return done.stdout if done.returncode == 0 else ""
 
 
 @contextmanager

@@ -77,7 +77,8 @@ def in_domain(network: Network, numeric: Floats) -> NDArray[np.bool_]:
     inside: NDArray[np.bool_] = np.all((numeric >= lower) & (numeric <= upper), axis=1)
     row = dict(zip(network.input_names, numeric.T, strict=True))
     for rule in network.constraints:
-        inside &= rule.margin(row) >= 0.0
+        with np.errstate(invalid="ignore"):
+            inside &= rule.margin(row) >= 0.0
     if network.density is not None:
         inside &= density_score(network, numeric) <= 1.0
     return inside

@@ -70,7 +70,9 @@ def scaled_inputs(network: Network, numeric: Floats, index: NDArray[np.int64]) -
     """What enters the first layer: scaled inputs, scaled derived columns, codes; (n, k + d + c)."""
     parts = [scale_columns(numeric, network.inputs)]
     if network.derived:
-        parts.append(scale_columns(numeric @ derived_matrix(network), network.derived))
+        with np.errstate(invalid="ignore"):
+            combined = numeric @ derived_matrix(network)
+        parts.append(scale_columns(combined, network.derived))
     return np.concatenate([*parts, network.codes[index]], axis=1)
 
 
@@ -139,8 +141,10 @@ def predict_rows(network: Network, numeric: Floats, index: NDArray[np.int64]) ->
     """Evaluate rows of SI inputs with their band and domain; parameters as `evaluate_rows`."""
     values = evaluate_rows(network, numeric, index)
     half = np.abs(values) * np.array([column.relative_band for column in network.outputs])
+    with np.errstate(invalid="ignore"):
+        lower, upper = values - half, values + half
     score = density_score(network, numeric)
-    return RowPredictions(values, values - half, values + half, score, in_domain(network, numeric))
+    return RowPredictions(values, lower, upper, score, in_domain(network, numeric))
 
 
 def evaluate(
