@@ -172,10 +172,10 @@ def write_json(path: Path, document: dict[str, Any]) -> Path:
 
 
 def fit_title(fit: Fit) -> str:
-    """Name, description and rows of a fit in one line."""
+    """Name and description of a fit, and its rows on a second line."""
     what = f" ({fit.spec.description})" if fit.spec.description else ""
     train, test = len(fit.table.rows("train")), len(fit.table.rows("test"))
-    return f"{fit.spec.name}{what}: {train:,} training rows, {test:,} test rows never trained on"
+    return f"{fit.spec.name}{what}\n{train:,} training rows, {test:,} test rows never trained on"
 
 
 def held_out(fit: Fit) -> HeldOutRows:
