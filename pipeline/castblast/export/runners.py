@@ -30,7 +30,7 @@ from castblast.export.python_source import OLDEST
 from castblast.network import Floats, Network
 
 _SECONDS = 300
-_RUN_ROWS = Path(__file__).parent / "templates" / "run_rows.mjs"
+RUN_ROWS = Path(__file__).parent / "templates" / "run_rows.mjs"
 
 Index = NDArray[np.int64]
 #: Network (for its names only), files and rows in; answers and the name of the tool out.
@@ -79,7 +79,7 @@ def run_js(network: Network, files: Files, numeric: Floats, index: Index) -> tup
         raise NotVerifiedError(message)
     with written(files) as folder:
         (folder / "package.json").write_text('{"type": "module"}')
-        text = run_program([node, _RUN_ROWS, folder / "model.js"], row_lines(numeric, index))
+        text = run_program([node, RUN_ROWS, folder / "model.js"], row_lines(numeric, index))
     return parse_answers(text, numeric.shape[1]), "node"
 
 
