@@ -54,6 +54,9 @@ class CastCase(NamedTuple):
     precision : {"float64", "mixed"}
         Mixed: motion and contact memory are stored in single precision; see
         `castblast.muckpile.state`.
+    sleeping : bool
+        Balls at rest are not computed until a ball near them moves; see
+        `castblast.muckpile.sleep`.
     """
 
     particles: Particles
@@ -76,6 +79,7 @@ class CastCase(NamedTuple):
     sample_interval: float = 0.02
     snapshot_interval: float = 0.0
     precision: str = "float64"
+    sleeping: bool = False
 
 
 class CastHistory(NamedTuple):
@@ -110,6 +114,8 @@ class EnergyLedger(NamedTuple):
         At the end.
     slip, rolling_slip, dashpot : float
         Dissipated on the way; NaN when not recorded.
+    slept : float
+        Kinetic energy taken from balls that fell asleep.
     residual : float [-]
         Open balance over the largest of: energy put in by firing, potential energy released, and
         kinetic energy at the start.
@@ -123,6 +129,7 @@ class EnergyLedger(NamedTuple):
     slip: float
     rolling_slip: float
     dashpot: float
+    slept: float
     residual: float
 
 
@@ -132,6 +139,8 @@ class CastCounters(NamedTuple):
     Attributes
     ----------
     steps, rebuilds, particle_steps : int
+    asleep : int
+        Balls that slept at the end.
     smallest_step, largest_step : float [s]
         Of the stable step by the rule, over the run.
     largest_overlap : float [-]
@@ -143,6 +152,7 @@ class CastCounters(NamedTuple):
     steps: int
     rebuilds: int
     particle_steps: int
+    asleep: int
     smallest_step: float
     largest_step: float
     largest_overlap: float

@@ -105,8 +105,8 @@ def _do_pairs(
 ) -> None:
     """Pair forces of the balls first .. last - 1; `work` is booked in row `w`."""
     pair_forces(
-        balls.place, balls.motion, balls.force, pairs.start, pairs.partner, pairs.memory,
-        pairs.touching, pairs.dash, first, last, law, step, work, w, blocks, names, b,
+        balls.place, balls.motion, balls.force, pairs.start, pairs.stop, pairs.partner,
+        pairs.memory, pairs.touching, pairs.dash, first, last, law, step, work, w, blocks, names, b,
     )  # fmt: skip
 
 
@@ -293,7 +293,7 @@ def present_forces(
     chunks = len(chunk) - 1
     blocks = np.empty(chunks * BLOCK_NUMBERS, balls.motion.dtype)
     names = np.empty(chunks * BLOCK_NAMES, np.int32)
-    balls.force[:] = 0.0
+    balls.force[:, 0:6] = 0.0
     for c in prange(chunks - 1):
         s = chunk[c + 1] - 1
         _do_pairs(balls, pairs, slab[s], slab[s + 1], law, 0.0, work, s, blocks, names, c)

@@ -22,6 +22,7 @@ from castblast.muckpile.neighbours import Grid, make_grid, sort_by_cell
 from castblast.muckpile.pair_search import list_pairs
 from castblast.muckpile.particles import FloatArray, Int32Array, Particles, ball_mass
 from castblast.muckpile.paths import lay_out, straight_paths
+from castblast.muckpile.sleep import ASLEEP, FREE, HELD, drowsiness, note_still, settle_balls
 from castblast.muckpile.stability import stable_step
 from castblast.muckpile.state import PRECISIONS, Balls, Contacts, make_contacts
 from castblast.muckpile.survey import (
@@ -49,7 +50,8 @@ FIRST_LIFE, LONGEST_LIFE = 16, 64
 #: What a run changes: numbers and arrays, and records of arrays.
 _CHANGING = (
     "clock", "steps", "rebuilds", "failed_ball", "smallest_step", "largest_step", "_slab", "_chunk",
-    "_work", "_spent", "_pending", "_step", "_built", "_life", "_horizon", "_stale", "_step_due",
+    "_work", "_spent", "_slept", "_pending", "_step", "_built", "_life", "_horizon", "_stale",
+    "_step_due",
 )  # fmt: skip
 _GROUPS: dict[str, type[Balls] | type[Contacts]] = {
     "_balls": Balls, "_pairs": Contacts, "_touches": Contacts,
@@ -81,6 +83,8 @@ class Simulation:
         Record what slip, rolling slip and dashpots dissipate.
     precision : {"float64", "mixed"}
         See `castblast.muckpile.state`.
+    sleeping : bool
+        Balls at rest are not computed, see `castblast.muckpile.sleep`.
     """
 
     particles: Particles
@@ -94,6 +98,7 @@ class Simulation:
     ballistic: bool = True
     keep_ledger: bool = True
     precision: str = "float64"
+    sleeping: bool = False
 
     clock: float = field(default=0.0, init=False)
     steps: int = field(default=0, init=False)
@@ -130,7 +135,8 @@ class Simulation:
         self._slab = np.array([0, count])
         self._chunk = np.array([0, 1])
         self._work = np.zeros((1, 3))
-        self._spent = np.zeros(3)
+        self._spent, self._slept = np.zeros(3), 0.0
+        self._drowsiness = drowsiness(2.0 * float(np.mean(given.radius)), self.gravity)
         self._pending, self._step = -1.0, 0.0
         self._built, self._life, self._horizon = 0.0, 0.0, inf
         self._stale, self._step_due = True, True
@@ -155,6 +161,17 @@ class Simulation:
     def dissipated(self) -> FloatArray:
         """Energy (3,) [J] spent by slip, rolling slip and dashpots so far."""
         return np.asarray(self._spent + self._work.sum(axis=0))
+
+    @property
+    def put_to_sleep(self) -> float:
+        """Kinetic energy [J] taken from balls that fell asleep so far."""
+        return self._slept
+
+    def asleep(self) -> NDArray[np.bool_]:
+        """Which balls (n,) sleep, in the caller's order."""
+        sleeps = np.empty(len(self._balls.place), dtype=np.bool_)
+        sleeps[self._balls.identity] = self._balls.motion[:, 7] == ASLEEP
+        return sleeps
 
     def state(self) -> Particles:
         """Return a copy of the present state in the caller's order."""
@@ -203,7 +220,7 @@ class Simulation:
         balls = self._balls
         mask = chosen[balls.identity]
         balls.motion[mask, 0:3] = velocity[balls.identity[mask]]
-        balls.motion[mask, 7] = 0.0
+        balls.motion[mask, 7] = FREE
         with enough_threads(len(mask)):
             if self._renew_lists():
                 self._evaluate()
@@ -320,13 +337,15 @@ class Simulation:
         if bad >= 0:
             self.failed_ball = bad
             return False
+        if self.sleeping:
+            note_still(self._balls, self.clock - self._built, self._drowsiness)
         fastest = greatest_deviation(self._balls.motion)
         life = self._next_life(fastest)
         reach = 2.0 * self._largest_radius + self.skin + fastest * life
         order, cell_start, grid = self._sort_balls(life, reach)
         balls, ledger = self._balls, self.keep_ledger
         real, place_of = balls.motion.dtype, inverse(order)
-        held = balls.motion[:, 7] != 0.0
+        held = balls.motion[:, 7] == HELD
         held = held if held.any() else held[:0]
         near = (balls.paths, held)
         guess = 1.1 * len(self._pairs.partner) / len(order) + 4.0
@@ -337,16 +356,22 @@ class Simulation:
         memory = put_aside(self._pairs)
         # The old list goes before the new one comes.
         self._pairs = self._touches
-        self._pairs = make_contacts(
-            *list_pairs(*near, cell_start, self._slab, grid, life, guess), real, ledger
-        )
+        start, partner = list_pairs(*near, cell_start, self._slab, grid, life, guess)
+        stop = None
+        if self.sleeping:
+            patience = self._drowsiness.patience
+            taken, stop = settle_balls(balls, start, partner, self._slab, patience)
+            self._slept += taken
+        self._pairs = make_contacts(start, partner, real, ledger, stop)
         restore(self._pairs, memory, order, place_of, False)
 
         self._chunk = cut_chunks(self._pairs.start[self._slab] + 2 * self._slab)
         self._spent += self._work.sum(axis=0)
         self._work = np.zeros((len(self._slab) - 1, 3))
         self._built, self._life, self._stale = self.clock, life, False
-        self._horizon = life if life > 0.0 else inf
+        # Balls that may fall asleep are looked at, whether their list needs a renewal or not.
+        look = 0.25 * self._drowsiness.patience if self.sleeping else inf
+        self._horizon = life if life > 0.0 else look
         self.rebuilds += 1
         return True
 

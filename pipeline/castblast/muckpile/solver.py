@@ -200,6 +200,7 @@ def _make_run(case: CastCase) -> Simulation:
         ballistic=case.ballistic,
         keep_ledger=case.keep_ledger,
         precision=case.precision,
+        sleeping=case.sleeping,
     )
 
 
@@ -266,6 +267,7 @@ def _run_to_rest(
             run.steps,
             run.rebuilds,
             run.steps * len(state.radius),
+            int(run.asleep().sum()),
             run.smallest_step,
             run.largest_step,
             record.largest_overlap,
@@ -309,7 +311,8 @@ def _close_ledger(
     spent = run.dissipated if case.keep_ledger else np.full(3, nan)
     slip, rolling_slip, dashpot = map(float, spent)
     before = sum(initial)
-    open_balance = before + fired - kinetic - potential - spring - (slip + rolling_slip + dashpot)
+    gone = slip + rolling_slip + dashpot + run.put_to_sleep
+    open_balance = before + fired - kinetic - potential - spring - gone
     scale = max(abs(fired), abs(initial[1] - potential), initial[0], 1e-300)
     return EnergyLedger(
         before,
@@ -320,5 +323,6 @@ def _close_ledger(
         slip,
         rolling_slip,
         dashpot,
+        run.put_to_sleep,
         open_balance / scale,
     )
