@@ -36,6 +36,20 @@ def muckpile(
             help='Burden velocity instead of the file\'s, "12.7 m/s".', show_default=False
         ),
     ] = None,
+    precision: Annotated[
+        str | None,
+        typer.Option(
+            metavar="mixed|float64", help="Instead of that of the file.", show_default=False
+        ),
+    ] = None,
+    sleeping: Annotated[
+        bool | None,
+        typer.Option(
+            "--sleeping/--no-sleeping",
+            help="Leave out balls at rest; instead of what the file says.",
+            show_default=False,
+        ),
+    ] = None,
     packings: Annotated[
         Path | None,
         typer.Option(
@@ -99,6 +113,8 @@ def muckpile(
         "balls": balls,
         "threads": threads,
         "velocity": velocity,
+        "precision": precision,
+        "sleeping": sleeping,
         "packings": packings,
         "extras": Extras(ore, dig_block, flitch, animation, vtk, vtkhdf, frame_interval),
         "decks": decks,

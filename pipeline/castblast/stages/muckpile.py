@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from castblast.errors import SimulationError, SpecError, Status
+from castblast.errors import SimulationError, SpecError, Status, nearest_name
 from castblast.muckpile.bench import Bench
 from castblast.muckpile.enclosure import rock_walls
 from castblast.muckpile.initial_state import pressed_share
@@ -16,6 +16,7 @@ from castblast.muckpile.metrics import pile_metrics
 from castblast.muckpile.particles import Particles
 from castblast.muckpile.simulation import Simulation
 from castblast.muckpile.solver import CastCase, CastResult, run_cast
+from castblast.muckpile.state import PRECISIONS
 from castblast.muckpile.terrain import wall_faults
 from castblast.muckpile.threads import thread_count
 from castblast.muckpile.walls import Walls, bench_walls, join, slope
@@ -53,6 +54,8 @@ def run_muckpile(
     threads: int | None = None,
     velocity: str | float | None = None,
     seed: int | None = None,
+    precision: str | None = None,
+    sleeping: bool | None = None,
     packings: Path | None = None,
     extras: Extras = Extras(),  # noqa: B008 - a record of constants
     decks: Decks = Decks(),  # noqa: B008 - a record of constants
@@ -74,6 +77,9 @@ def run_muckpile(
         Instead of that of the file; a text carries its unit.
     seed : int, optional
         Instead of that of the file.
+    precision : {"mixed", "float64"}, optional
+    sleeping : bool, optional
+        Instead of `numerics` of the file.
     packings : path, optional
         Folder of packings, named by the hash of their content: one that is there is used again,
         whatever run made it. Default: ``packings`` in `out`.
@@ -95,6 +101,7 @@ def run_muckpile(
     """
     path = find_bench(bench)
     spec = _with_options(load_bench(path), balls, velocity)
+    spec = _with_numerics(spec, precision, sleeping)
     if seed is not None:
         spec = spec.model_copy(update={"seed": seed})
     geometry = spec.bench.to_bench()
@@ -202,6 +209,16 @@ def _with_options(spec: BenchSpec, balls: int | None, velocity: str | float | No
     return spec.model_copy(update=update)
 
 
+def _with_numerics(spec: BenchSpec, precision: str | None, sleeping: bool | None) -> BenchSpec:
+    """Bench spec with what the command line says about the solution."""
+    if precision is not None and precision not in PRECISIONS:
+        hint = nearest_name(precision, PRECISIONS)
+        raise SpecError(f"--precision: {precision}: must be one of {', '.join(PRECISIONS)}{hint}")
+    given = {"precision": precision, "sleeping": sleeping}
+    update = {name: value for name, value in given.items() if value is not None}
+    return spec.model_copy(update={"numerics": spec.numerics.model_copy(update=update)})
+
+
 def _part(progress: ProgressCallback, low: float, high: float) -> ProgressCallback:
     """Progress of one part of the run; the share, an estimate there, never falls."""
     reached = 0.0
@@ -257,6 +274,8 @@ def _case(spec: BenchSpec, walls: Walls, balls: Particles, plan: Plan, threads: 
         step_safety=spec.numerics.step_safety,
         time_step=spec.numerics.time_step or 0.0,
         threads=threads,
+        precision=spec.numerics.precision,
+        sleeping=spec.numerics.sleeping,
     )
 
 

@@ -104,6 +104,7 @@ def describe_run(
         **metrics._asdict(),
         "ore": describe_ore(ore) if ore else None,
         "units": DOCUMENT_UNITS,
+        "numerics": spec.numerics.model_dump(),
         "ledger": result.ledger._asdict(),
         "counters": counters,
         "seconds": seconds,
