@@ -43,9 +43,12 @@ def to_excel(network: Network) -> Files:
     except ImportError:
         message = "export target 'excel': needs openpyxl, pip install 'castblast[excel]'"
         raise SpecError(message) from None
+    from openpyxl.worksheet.properties import PageSetupProperties
+
     book = openpyxl.Workbook()
     predict = book.active
     predict.title = "Predict"
+    predict.sheet_properties.pageSetUpPr = PageSetupProperties(fitToPage=True)
     working, check = book.create_sheet("Working"), book.create_sheet("Check")
     constants = Constants(book.create_sheet("Network"))
     block = _working(network, constants, working)
@@ -100,7 +103,7 @@ def _predict(network: Network, sheet: Worksheet, block: Block) -> None:
     document = compact(network)
     model = document["model"]
     sheet["A1"] = f"Blast surrogate {model['name']}, trained on {model['dataset']}"
-    sheet["A1"].font = Font(bold=True, size=14)
+    sheet["A1"].font = Font(name="Calibri", bold=True, size=14)
     sheet["A2"] = (
         "Answers hold for the simulator that the surrogate was trained on, inside its domain only."
     )
@@ -122,7 +125,9 @@ def _predict(network: Network, sheet: Worksheet, block: Block) -> None:
     last = bottom + 6 + len(document["outputs"])
     sheet.cell(last, 1, "Self-check: largest relative deviation on the golden rows")
     sheet.cell(last, 2, "=Check!$B$1").number_format = "0.0E+00"
-    for column, width in zip("ABCDEF", (58, 20, 20, 20, 12, 16), strict=True):
+    sheet.page_setup.orientation = "landscape"
+    sheet.page_setup.fitToHeight = 0
+    for column, width in zip("ABCDEF", (62, 20, 20, 20, 12, 16), strict=True):
         sheet.column_dimensions[column].width = width
 
 
@@ -130,7 +135,10 @@ def _inputs(document: dict[str, Any], sheet: Worksheet, block: Block) -> None:
     from openpyxl.styles import Font, PatternFill
     from openpyxl.worksheet.datavalidation import DataValidation
 
-    blue = {"font": Font(color="1F3FBF"), "fill": PatternFill("solid", fgColor="E8EEFC")}
+    blue = {
+        "font": Font(name="Calibri", color="1F3FBF"),
+        "fill": PatternFill("solid", fgColor="E8EEFC"),
+    }
     sheet["A4"] = "Explosive"
     sheet["B4"] = document["explosives"][0]
     listed = DataValidation(type="list", formula1='"' + ",".join(document["explosives"]) + '"')
@@ -138,7 +146,7 @@ def _inputs(document: dict[str, Any], sheet: Worksheet, block: Block) -> None:
     sheet.add_data_validation(listed)
     listed.add("B4")
     for i, head in enumerate(("Input", "Value", "Trained from", "to", "Unit", "Verdict"), 1):
-        sheet.cell(INPUT_TOP - 1, i, head).font = Font(bold=True)
+        sheet.cell(INPUT_TOP - 1, i, head).font = Font(name="Calibri", bold=True)
     for i, column in enumerate(document["inputs"]):
         row, factor = INPUT_TOP + i, column["shown_factor"]
         lower, upper = column["lower"] * factor, column["upper"] * factor
@@ -166,7 +174,7 @@ def _results(
     from openpyxl.styles import Font
 
     for i, head in enumerate(("Result", "Value", "95 % from", "to", "Unit"), 1):
-        sheet.cell(top, i, head).font = Font(bold=True)
+        sheet.cell(top, i, head).font = Font(name="Calibri", bold=True)
     for j, column in enumerate(document["outputs"]):
         row, factor = top + 1 + j, column["shown_factor"]
         sheet.cell(row, 1, column["title"])
@@ -175,7 +183,7 @@ def _results(
             text = f'IFERROR({cell},"no value")'
             if i > 2:
                 text = f'IF({state}="outside","unknown",{text})'
-            sheet.cell(row, i, f"={text}").number_format = "0.00000"
+            sheet.cell(row, i, f"={text}").number_format = "0.0000"
         sheet.cell(row, 5, column["shown_unit"])
 
 
