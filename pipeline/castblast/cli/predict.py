@@ -31,7 +31,7 @@ def predict(
         ),
     ] = None,
     network: Annotated[
-        Path | None, typer.Option(help="Another network.json.", show_default=False)
+        Path | None, typer.Option(help="A network.json, or: full, paper.", show_default="full")
     ] = None,
 ) -> Mapping[str, Any]:
     """Predict equilibrium pressure, hole expansion, crushed zone and burden velocity.

@@ -377,15 +377,15 @@ class Simulation:
 
     def _sort_balls(self, life: float, reach: float) -> tuple[Int32Array, Int32Array, Grid]:
         """Bring the balls into the order of cells, for lists of this `life` [s] and `reach` [m]."""
-        balls = self._balls
-        rows, lower, upper = straight_paths(balls.place, balls.motion, life)
-        grid = make_grid(lower, upper, reach, len(balls.place))
+        # One array at a time, each in the place of its old self: here a run needs most memory.
+        self._balls = self._balls._replace(paths=np.empty((7, 0), dtype=np.float32))
+        rows, lower, upper = straight_paths(self._balls.place, self._balls.motion, life)
+        grid = make_grid(lower, upper, reach, len(rows))
         order, cell_start, self._slab = sort_by_cell(rows, grid, 0.5 * life)
-        self._balls = Balls(
-            take_rows(balls.place, order),
-            take_rows(balls.motion, order),
-            take_rows(balls.force, order),
-            lay_out(rows, balls.place[:, 3], order, self.skin),
-            balls.identity[order],
-        )
+        paths = lay_out(rows, self._balls.place[:, 3], order, self.skin)
+        del rows
+        self._balls = self._balls._replace(paths=paths, identity=self._balls.identity[order])
+        for name in ("place", "motion", "force"):
+            taken = take_rows(getattr(self._balls, name), order)
+            self._balls = self._balls._replace(**{name: taken})
         return order, cell_start, grid

@@ -31,8 +31,11 @@ from castblast.variables import INPUT_NAMES, STEMMING_RATIO, VARIABLES
 
 #: Green, amber, red: in the domain; every value and rule kept but unusual together; beyond them.
 Domain = Literal["inside", "unusual", "outside"]
-#: The network that comes with castblast.
-CHOSEN_NETWORK = "models/chosen/network.json"
+#: Networks that come with castblast by the recipe of their dataset; the first is taken by default.
+SHIPPED_NETWORKS = {
+    "full": "models/chosen/network.json",
+    "paper": "models/chosen/paper/network.json",
+}
 
 
 @dataclass(frozen=True)
@@ -46,14 +49,22 @@ class Prediction:
 
 
 def load_network(path: Path | None = None) -> Network:
-    """Read a network; without a path the one that comes with castblast.
+    """Read a network from a file, or one that comes with castblast by its name.
+
+    Parameters
+    ----------
+    path : path, optional
+        A file, or one of `SHIPPED_NETWORKS`; default: the first of these.
 
     Raises
     ------
     SpecError
         Missing or unusable file.
     """
-    return read_network(resource(CHOSEN_NETWORK) if path is None else path)
+    name = "full" if path is None else str(path)
+    if name not in SHIPPED_NETWORKS or Path(name).exists():
+        return read_network(Path(name))
+    return read_network(resource(SHIPPED_NETWORKS[name]))
 
 
 def predict(
