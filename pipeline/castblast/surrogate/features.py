@@ -305,18 +305,37 @@ def input_columns(
 ) -> tuple[InputColumn, ...]:
     """Describe the numeric features with their scaling and the range of the training rows."""
     train = table.frame.iloc[table.rows("train")]
-    return tuple(
-        InputColumn(
-            name=name,
-            unit=VARIABLES[name].unit,
-            transform=transforms[j],
-            mean=float(mean[j]),
-            scale=float(scale[j]),
-            lower=float(train[name].min()),
-            upper=float(train[name].max()),
+    columns = []
+    for j, name in enumerate(table.feature_names):
+        values = train[name].to_numpy()
+        logged = transforms[j] == "log"
+        ends = _trained_range(np.log(values) if logged else values)
+        lower, upper = np.exp(ends) if logged else ends
+        columns.append(
+            InputColumn(
+                name=name,
+                unit=VARIABLES[name].unit,
+                transform=transforms[j],
+                mean=float(mean[j]),
+                scale=float(scale[j]),
+                lower=float(lower),
+                upper=float(upper),
+            )
         )
-        for j, name in enumerate(table.feature_names)
-    )
+    return tuple(columns)
+
+
+def _trained_range(values: Floats) -> tuple[float, float]:
+    """Range of values with two strata of their design outwards, never across 0.
+
+    The samples of a Latin hypercube keep off the ends of the range they are drawn from, and the
+    ends are what people ask for: no tensile strength, a vertical face.
+    """
+    least, most = float(values.min()), float(values.max())
+    # At the least a hair, so that rounding of a linear rule keeps every training row inside.
+    margin = max(2.0 * (most - least) / len(values), 1e-9)
+    lower, upper = least - margin, most + margin
+    return max(lower, 0.0) if least >= 0.0 else lower, min(upper, 0.0) if most <= 0.0 else upper
 
 
 def domain_constraints(table: Table) -> tuple[Constraint, ...]:
@@ -333,8 +352,7 @@ def domain_constraints(table: Table) -> tuple[Constraint, ...]:
             continue
         train = table.frame.iloc[table.rows("train")]
         ratio = sum(c * train[name] for name, c in parts.items()) / train[base]
-        # A hair outward, so that rounding of the linear form keeps every training row inside.
-        least, most = float(ratio.min()) - 1e-9, float(ratio.max()) + 1e-9
+        least, most = _trained_range(ratio.to_numpy())
         shown, unit = base.replace("_", " "), VARIABLES[base].unit
         rules.append(
             Constraint(f"{label} at least {least:.3g} {shown}", {**parts, base: -least}, 0.0, unit)
