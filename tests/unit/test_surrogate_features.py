@@ -82,14 +82,14 @@ def test_domain_rules_hold_for_every_training_row_and_come_close_to_one(table) -
     for rule in rules:
         margin = np.asarray(rule.margin(train))
         assert margin.min() > 0.0
-        assert margin.min() < 0.02 * np.ptp(margin)
+        assert margin.min() < 0.05 * np.ptp(margin)
     (least,) = re.findall(r"at least (\S+)", rules[0].label)
     assert float(least) == pytest.approx(0.4, abs=0.01)
     assert "burden" in rules[0].label
 
 
 def test_the_domain_takes_in_the_ends_of_the_ranges_that_were_drawn_from(table) -> None:
-    """No sample of a Latin hypercube lies on an end, yet 0 and 1 belong to what it was drawn from."""
+    """No sample of a Latin hypercube lies on 0 or 1, yet it was drawn from all between them."""
     count = len(table.frame)
     drawn = (np.random.default_rng(3).permutation(count) + 0.5) / count
     frame = table.frame.assign(ucs=drawn, burden=np.exp(drawn))

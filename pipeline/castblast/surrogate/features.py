@@ -326,14 +326,15 @@ def input_columns(
 
 
 def _trained_range(values: Floats) -> tuple[float, float]:
-    """Range of values with two strata of their design outwards, never across 0.
+    """Range of values with five strata of their design outwards, never across 0.
 
-    The samples of a Latin hypercube keep off the ends of the range they are drawn from, and the
-    ends are what people ask for: no tensile strength, a vertical face.
+    The samples of a Latin hypercube keep off the ends of the range they are drawn from, and some of
+    the outermost are no training rows; but the ends are what people ask for: no tensile strength,
+    a vertical face.
     """
     least, most = float(values.min()), float(values.max())
     # At the least a hair, so that rounding of a linear rule keeps every training row inside.
-    margin = max(2.0 * (most - least) / len(values), 1e-9)
+    margin = max(5.0 * (most - least) / len(values), 1e-9)
     lower, upper = least - margin, most + margin
     return max(lower, 0.0) if least >= 0.0 else lower, min(upper, 0.0) if most <= 0.0 else upper
 
