@@ -6,8 +6,8 @@ is chaotic: the second run is another sample of the same cast, and the measure o
 counts as harmless: the mean difference to the first run lies within twice its standard error, or
 is small against the scatter of that second run and against that between packings.
 
-    python pipeline/studies/muckpile_precision.py FOLDER --seeds 1 2 3 4 5 --balls 3000
-    python pipeline/studies/muckpile_precision.py OTHER --seeds 1 2 3 --delay 3
+    python pipeline/studies/muckpile_precision.py FOLDER --seeds 1 2 3 4 5 6 --again 2
+    python pipeline/studies/muckpile_precision.py OTHER --seeds 1 2 3 4 5 6 --delay 3
     python pipeline/studies/muckpile_precision.py FOLDER --table
 
 The first line makes what is missing in FOLDER, one file per run, so that several processes may
@@ -36,6 +36,7 @@ from castblast.muckpile.packing import fill_bench, mean_radius_for_count
 from castblast.muckpile.particles import Particles, centre_of_mass, particles_at_rest
 from castblast.muckpile.profile import mean_profile, surface_height
 from castblast.muckpile.solver import CastCase, CastResult, run_cast
+from castblast.muckpile.state import PRECISIONS
 from castblast.muckpile.walls import bench_walls
 
 BENCH = Bench(length=6.0, width=9.0, height=6.0, burden=3.0, spacing=3.0)
@@ -137,6 +138,41 @@ def produce(folder: Path, seeds: list[int], balls: int, delay: float) -> None:
             print(f"seed {seed}, {way}: {document['seconds']:.1f} s", flush=True)
 
 
+def repeat(folder: Path, seeds: list[int], balls: int, delay: float, times: int) -> None:
+    """Throw every packing so many more times in both precisions, each time with other noise."""
+    for seed in seeds:
+        packed = packing(folder, seed, balls)
+        for number in range(1, times + 1):
+            for precision in PRECISIONS:
+                path = folder / f"again_{seed}_{number}_{precision}.json"
+                if path.exists():
+                    continue
+                case = make_case(with_noise(packed, seed + 100 * number), delay)
+                began = process_time()
+                result = run_cast(case._replace(precision=precision))
+                document = describe(case, result, process_time() - began)
+                write_text(path, json.dumps(document))
+                print(f"seed {seed}, again {number}, {precision}", flush=True)
+
+
+def print_repeats(folder: Path, runs: list[list[dict[str, Any]]]) -> None:
+    """Mixed less double precision, both as means over all runs of a packing."""
+    print("\n| number | unit | mixed less float64 | scatter of runs of a packing |")
+    print("|---|---|---|---|")
+    seeds = sorted(int(path.name.split("_")[1]) for path in folder.glob("seed_*_way_4.json"))
+    for name, unit in _MEASURES:
+        apart, scatter = [], []
+        for seed, ways in zip(seeds, runs, strict=True):
+            found = {"float64": [ways[0][name], ways[1][name]], "mixed": [ways[2][name]]}
+            for path in sorted(folder.glob(f"again_{seed}_*.json")):
+                found[path.stem.split("_")[-1]].append(json.loads(path.read_text())[name])
+            apart.append(np.mean(found["mixed"]) - np.mean(found["float64"]))
+            scatter.append(np.var(found["float64"], ddof=1))
+        error = np.std(apart, ddof=1) / sqrt(len(apart))
+        shown = f"{np.mean(apart):+.2g} ± {error:.2g} | {sqrt(np.mean(scatter)):.2g}"
+        print(f"| {name} | {unit} | {shown} |")
+
+
 def read_runs(folder: Path) -> list[list[dict[str, Any]]]:
     """Runs of each seed that is complete, in the order of `WAYS`."""
     seeds = sorted(folder.glob("seed_*_way_0.json"))
@@ -207,13 +243,15 @@ def main() -> None:
     """Read the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3, 4, 5])
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3, 4, 5, 6])
     parser.add_argument("--balls", type=int, default=3000)
     parser.add_argument("--delay", type=float, default=0.1, help="between rows [s]")
+    parser.add_argument("--again", type=int, default=0, help="further runs in both precisions")
     parser.add_argument("--table", action="store_true", help="print what is there")
     given = parser.parse_args()
     if not given.table:
         produce(given.folder, given.seeds, given.balls, given.delay)
+        repeat(given.folder, given.seeds, given.balls, given.delay, given.again)
         return
     runs = read_runs(given.folder)
     if len(runs) < 2:
@@ -221,6 +259,7 @@ def main() -> None:
     print_differences(runs)
     print_profiles(runs)
     print_costs(runs)
+    print_repeats(given.folder, runs)
 
 
 if __name__ == "__main__":

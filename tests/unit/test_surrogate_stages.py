@@ -161,7 +161,7 @@ def test_inputs_outside_the_training_data_are_named(network: Path) -> None:
     answer = predict({"burden": 8.0, "bench_height": 20.0}, "anfo", network)
     assert not answer["in_domain"]
     assert answer["out_of_domain"] == ["burden"]
-    assert answer["domain_faults"][0].startswith("burden = 8 m: trained on 1.5")
+    assert answer["domain_faults"][0].startswith("burden = 8 m: trained on 1.")
     joint = predict({"burden": 2.0, "bench_height": 20.0, "charge_length": 12.0}, "anfo", network)
     assert joint["out_of_domain"] == ["bench_height", "charge_length", "burden"]
     assert (answer["domain"], answer["domain_kinds"]) == ("outside", ["box"])

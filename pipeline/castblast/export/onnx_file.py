@@ -355,4 +355,6 @@ def _reference_columns(
     from onnx.reference import ReferenceEvaluator
 
     evaluator = ReferenceEvaluator(model)
-    return list(evaluator.output_names), list(evaluator.run(None, rows))
+    # The graph takes logarithms of all columns and then those that are meant: 0 may be among them.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return list(evaluator.output_names), list(evaluator.run(None, rows))
