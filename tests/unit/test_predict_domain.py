@@ -63,7 +63,7 @@ def test_people_read_the_verdict_and_its_reason(
     assert "density score 0." in inside.remarks[-1]
     far = predict_design({"burden": "9 m", "bench_height": "24 m"}, "anfo")
     assert far.rows[0][2] == "unknown: outside the training data"
-    assert far.remarks[-1].startswith("outside the training data: burden = 9 m: trained on 1.5")
+    assert far.remarks[-1].startswith("outside the training data: burden = 9 m: trained on 1.")
     tight = replace(model.density, threshold=1e-3)
     model = replace(model, density=tight)
     odd = predict_design({"burden": "3 m"}, "anfo")
