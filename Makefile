@@ -10,7 +10,7 @@ demo: $(VENV)/.demo          ## the whole chain at a small size; ends with demo/
 	$(BIN)/castblast demo --out demo
 
 test: $(VENV)/.dev lint      ## linters, then the whole test suite
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder
 
 lint: $(VENV)/.dev           ## ruff, mypy --strict, import layers
 	$(BIN)/ruff check .
