@@ -14,9 +14,9 @@ from castblast.export.onnx_file import to_onnx
 from castblast.export.plain import Files
 from castblast.export.python_source import to_python
 from castblast.export.runners import Runner, run_c, run_js, run_json, run_onnx, run_python
+from castblast.export.web import run_web, to_web
 from castblast.export.workbook import to_excel
 from castblast.export.workbook_runner import run_excel
-from castblast.export.web import run_web, to_web
 from castblast.network import Network
 
 

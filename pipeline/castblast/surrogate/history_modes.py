@@ -133,7 +133,8 @@ def _common_time(dataset: xr.Dataset, good: Any) -> tuple[Floats, Floats]:
     """
     rise = dataset["rise_time"].to_numpy()[good]
     end = dataset["history_time"].to_numpy()[good][:, -1].astype(np.float64) / rise
-    log_pressure = np.log(dataset["history_pressure"].to_numpy()[good].astype(np.float64))
+    pressure = dataset["history_pressure"].to_numpy()[good].astype(np.float64)
+    log_pressure = np.log(np.maximum(pressure, 1.0))  # 0 at the start, which is not used
     times = np.geomspace(1.0, float(np.quantile(end, 0.9)), _POINTS)
     last = log_pressure.shape[1] - 1
     place = last * np.sqrt(np.minimum(times[None, :] / end[:, None], 1.0))
