@@ -35,7 +35,8 @@ def page(browser):
         "console", lambda m: troubles.append(m.text) if m.type in ("error", "warning") else None
     )
     page.on("pageerror", lambda error: troubles.append(str(error)))
-    page.on("request", lambda r: troubles.append(r.url) if not r.url.startswith(("file:", "data:", "blob:")) else None)  # fmt: skip
+    local = ("file:", "data:", "blob:")
+    page.on("request", lambda r: None if r.url.startswith(local) else troubles.append(r.url))
     page.goto(shipped_page().as_uri())
     page.wait_for_selector("#results li")
     yield page

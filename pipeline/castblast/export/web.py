@@ -103,7 +103,8 @@ def _held_lines(network: Network) -> list[str]:
         variable = VARIABLES.get(name)
         if variable is not None and variable.role != "solver":
             title = variable.long_name.split(";")[0]
-            lines.append(f"{title[0].upper()}{title[1:]}: {variable.show(value)}")
+            shown = variable.show(value).replace("kg m-3", "kg/m3").replace("m s-1", "m/s")
+            lines.append(f"{title[0].upper()}{title[1:]}: {shown}")
     return lines
 
 

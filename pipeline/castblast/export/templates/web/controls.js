@@ -47,7 +47,7 @@ export function buildControls(system, change) {
 function control(column, system, change) {
   const { name, lower, upper } = column;
   const { unit, factor } = unitOf(name, system);
-  const title = sentence(facts.variables[name]?.title ?? spaced(name));
+  const title = titleOf(name);
   const range = `${digits(lower * factor, 3)} to ${digits(upper * factor, 3)}${unit ? ` ${unit}` : ""}`;
   const field = htmlNode("input", {
     type: "text", inputmode: "decimal", autocomplete: "off", id: `field-${name}`, "aria-describedby": `hint-${name}`,

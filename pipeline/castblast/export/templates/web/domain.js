@@ -14,13 +14,13 @@ export function domainWords(design, result, system) {
   const row = design.values;
   network.inputs.forEach(({ name, lower, upper }) => {
     if (!(row[name] >= lower && row[name] <= upper)) {
-      reasons.push(`${sentence(spaced(name))} is ${withUnit(name, row[name], system)}; trained on ${withUnit(name, lower, system)} to ${withUnit(name, upper, system)}`);
+      reasons.push(`${titleOf(name)} is ${withUnit(name, row[name], system)}; trained on ${withUnit(name, lower, system)} to ${withUnit(name, upper, system)}`);
     }
   });
   for (const { label, terms, lower } of network.rules) {
     const sum = terms.reduce((total, [i, c]) => total + c * row[network.inputs[i].name], 0);
     if (!(sum - lower >= 0)) reasons.push(`Trained on: ${label}`);
   }
-  if (result.domain === "unusual") reasons.push(`Unusual together: ${result.offending.map(spaced).join(", ")} (score ${digits(result.score, 3)}, at most 1 inside)`);
+  if (result.domain === "unusual") reasons.push(`Unusual together: ${result.offending.map(titleOf).join(", ").toLowerCase()} (score ${digits(result.score, 3)}, at most 1 inside)`);
   return { title, text, reasons };
 }

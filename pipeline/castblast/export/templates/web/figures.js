@@ -3,22 +3,28 @@ import { completed } from "./design.js";
 import { historyOf } from "./histories.js";
 import { canvas, htmlNode, label, line, path, scaleOf, svgNode, ticks } from "./drawing.js";
 
+/* Time until which the curve is drawn: 1.8 times the last moment that is 3 percent off its end. */
+function shownTime({ time, pressure }) {
+  const off = pressure.findLastIndex((p) => Math.abs(p / pressure.at(-1) - 1) > 0.03);
+  return Math.min(time.at(-1), 1.8 * time[Math.max(off, 1)]);
+}
+
 /** Gas pressure over time with its band; the kept design dashed. */
 export function pressureFigure(design, kept, system) {
   const curve = historyOf(design.explosive, completed(design));
   if (!curve) return null;
   const other = kept && historyOf(kept.explosive, completed(kept));
-  const [W, H, left, right, top, bottom] = [560, 280, 52, 14, 14, 40];
+  const [W, H, left, right, top, bottom] = [420, 270, 40, 10, 14, 40];
   const time = unitOf("equilibrium_time", system);
   const pressure = system === "metric" ? { unit: "GPa", factor: 1e-9 } : unitOf("equilibrium_pressure", system);
-  const end = curve.time.at(-1) * time.factor;
+  const end = shownTime(curve) * time.factor;
   const most = 1.05 * Math.max(...curve.upper, ...(other ? other.pressure : [])) * pressure.factor;
   const x = scaleOf(0, end, left, W - right);
   const y = scaleOf(0, most, H - bottom, top);
   const svg = canvas(W, H, `Gas pressure in the hole over time: peak ${digits(Math.max(...curve.pressure) * pressure.factor, 3)} ${pressure.unit}, end ${digits(curve.pressure.at(-1) * pressure.factor, 3)} ${pressure.unit} after ${digits(end, 3)} ${time.unit}`);
-  for (const t of ticks(0, most, 5)) svg.append(line(left, y(t), W - right, y(t), "grid"), label(left - 7, y(t) + 4, digits(t, 3), "end"));
-  for (const t of ticks(0, end, 6)) svg.append(line(x(t), H - bottom, x(t), H - bottom + 4, "axis"), label(x(t), H - bottom + 18, digits(t, 2), "middle"));
-  const points = (c, key) => c.time.map((t, i) => [Math.min(x(t * time.factor), W - right), y(c[key][i] * pressure.factor)]);
+  for (const t of ticks(0, most, 5)) svg.append(line(left, y(t), W - right, y(t), "grid"), label(left - 7, y(t) + 4, tickText(t), "end"));
+  for (const t of ticks(0, end, 6)) svg.append(line(x(t), H - bottom, x(t), H - bottom + 4, "axis"), label(x(t), H - bottom + 18, tickText(t), "middle"));
+  const points = (c, key) => c.time.map((t, i) => [x(t * time.factor), y(c[key][i] * pressure.factor)]).filter(([place]) => place <= W - right);
   svg.append(path([...points(curve, "upper"), ...points(curve, "lower").reverse()], "band", true));
   if (other) svg.append(path(points(other, "pressure"), "curve kept"));
   svg.append(path(points(curve, "pressure"), "curve"), line(left, H - bottom, W - right, H - bottom, "axis"));
@@ -31,8 +37,8 @@ export function energyFigure(design) {
   const curve = historyOf(design.explosive, completed(design));
   if (!curve) return null;
   const shares = [...curve.shares].sort((a, b) => b.value - a.value);
-  const [W, row, left] = [560, 34, 8];
-  const most = Math.max(...shares.map(({ upper }) => upper)) * 1.25;
+  const [W, row, left] = [420, 36, 2];
+  const most = Math.max(...shares.map(({ upper }) => upper)) * 1.5;
   const x = scaleOf(0, most, left, W - 8);
   const svg = canvas(W, shares.length * row + 4, `Energy of the explosive: ${shares.map((s) => `${s.title} ${percent(s.value, 2)}`).join(", ")}`);
   shares.forEach((share, i) => {
@@ -121,13 +127,13 @@ export function tornadoFigure(lines, now, system) {
   const { unit, factor } = unitOf("burden_velocity", system);
   const shown = lines.filter(({ low }) => low);
   if (!shown.length) return null;
-  const [W, row, left, right, top] = [560, 40, 20, 20, 6];
+  const [W, row, left, right, top] = [420, 42, 6, 8, 6];
   const low = Math.min(now, ...shown.map((l) => l.low.lower)) * factor;
   const high = Math.max(now, ...shown.map((l) => l.high.upper)) * factor;
   const x = scaleOf(0.9 * low, 1.05 * high, left, W - right);
   const bottom = top + shown.length * row;
   const svg = canvas(W, bottom + 40, `Velocity over the range of each input: ${shown.map((l) => `${spaced(l.name)} ${digits(l.low.value * factor, 3)} to ${digits(l.high.value * factor, 3)} ${unit}`).join(", ")}`);
-  for (const t of ticks(0.9 * low, 1.05 * high, 6)) svg.append(line(x(t), top, x(t), bottom, "grid"), label(x(t), bottom + 16, digits(t, 3), "middle"));
+  for (const t of ticks(0.9 * low, 1.05 * high, 6)) svg.append(line(x(t), top, x(t), bottom, "grid"), label(x(t), bottom + 16, tickText(t), "middle"));
   shown.forEach((l, i) => {
     const y = top + i * row;
     const [a, b] = [x(l.low.value * factor), x(l.high.value * factor)];
@@ -135,7 +141,7 @@ export function tornadoFigure(lines, now, system) {
       svgNode("rect", { x: a, y: y + 19, width: Math.max(1, b - a), height: 11, rx: 1.5, class: "bar" }),
       line(x(l.low.lower * factor), y + 24.5, x(l.low.upper * factor), y + 24.5, "whisker"),
       line(x(l.high.lower * factor), y + 24.5, x(l.high.upper * factor), y + 24.5, "whisker"),
-      label(left, y + 13, sentence(spaced(l.name)), "start", "bar-name"),
+      label(left, y + 13, titleOf(l.name), "start", "bar-name"),
       label(W - right, y + 13, `${withUnit(l.name, l.low.x, system, 3)} \u2192 ${withUnit(l.name, l.high.x, system, 3)}`, "end", "tick"),
     );
   });

@@ -26,6 +26,8 @@ function showResults(result, other) {
     ...(other ? [difference(row, other)] : []),
   );
   at("results").replaceChildren(...result.rows.map(cell));
+  const speed = result.rows.find(({ key }) => key === "burden_velocity");
+  at("glance").textContent = speed ? `${speed.title} ${withUnit(speed.variable, speed.value, system)} (${digits(speed.lower * unitOf(speed.variable, system).factor)} to ${digits(speed.upper * unitOf(speed.variable, system).factor)})` : "";
 }
 
 function difference(row, other) {
@@ -41,7 +43,7 @@ const signed = (share) => `${share < 0 ? "\u2212" : "+"}${Math.abs(100 * share).
 function showDomain(result) {
   const { title, text, reasons } = domainWords(state.design, result, state.system);
   const badge = at("domain");
-  badge.dataset.domain = result.domain;
+  badge.dataset.domain = at("glance").dataset.domain = result.domain;
   badge.replaceChildren(
     htmlNode("strong", {}, title), htmlNode("span", {}, ` ${text}`),
     ...(reasons.length ? [htmlNode("ul", {}, ...reasons.map((reason) => htmlNode("li", {}, reason)))] : []),
@@ -66,9 +68,10 @@ function showFigures(result) {
 }
 
 function showNothing() {
-  const names = inputNames.filter((name) => !Number.isFinite(state.design.values[name])).map(spaced);
+  const names = inputNames.filter((name) => !Number.isFinite(state.design.values[name])).map(titleOf);
   const badge = at("domain");
-  badge.dataset.domain = "invalid";
+  badge.dataset.domain = at("glance").dataset.domain = "invalid";
+  at("glance").textContent = "No answer: see the marked input";
   badge.replaceChildren(htmlNode("strong", {}, "No answer"), htmlNode("span", {}, ` Not a usable number: ${names.join(", ")}.`));
   at("results-panel").dataset.domain = "invalid";
   at("results").replaceChildren();

@@ -37,6 +37,10 @@ export function withUnit(name, value, system, count = 4) {
   return `${digits(value * factor, count)}${unit && unit !== "\u00b0" ? "\u00a0" : ""}${unit}`;
 }
 
+/** A round number of an axis. */
+export const tickText = (value) => String(Number(value.toPrecision(4)));
+/** Name of a variable in words for people. */
+export const titleOf = (name) => sentence(facts.variables[name]?.title ?? spaced(name));
 export const percent = (share, count = 2) => `${digits(100 * share, count)}\u00a0%`;
 export const sentence = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 export const spaced = (name) => name.replaceAll("_", " ");
