@@ -36,7 +36,7 @@ export function resultsOf(design) {
   if (speed) {
     const way = (v) => throwDistance(v, full.bench_height);
     rows.push({
-      key: "throw_distance", variable: "burden", title: "Throw of the mean", exact: false,
+      key: "throw_distance", variable: "burden", title: "Mean throw", exact: false,
       value: way(speed.value), lower: way(speed.lower), upper: way(speed.upper),
       note: "Free flight, band of the velocity only",
     });

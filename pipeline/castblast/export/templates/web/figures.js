@@ -38,17 +38,18 @@ export function energyFigure(design) {
   if (!curve) return null;
   const shares = [...curve.shares].sort((a, b) => b.value - a.value);
   const [W, row, left] = [420, 36, 2];
-  const most = Math.max(...shares.map(({ upper }) => upper)) * 1.5;
+  const most = Math.max(...shares.map(({ upper }) => upper)) * 1.75;
   const x = scaleOf(0, most, left, W - 8);
   const svg = canvas(W, shares.length * row + 4, `Energy of the explosive: ${shares.map((s) => `${s.title} ${percent(s.value, 2)}`).join(", ")}`);
   shares.forEach((share, i) => {
     const y = i * row;
     const value = Math.max(0, share.value);
+    const shown = (part) => (100 * part).toFixed(Math.min(3, Math.max(1, Math.ceil(-Math.log10(100 * share.band)))));
     svg.append(
       label(left, y + 12, sentence(share.title), "start", "bar-name"),
       svgNode("rect", { x: left, y: y + 17, width: Math.max(0.5, x(value) - left).toFixed(1), height: 9, rx: 1.5, class: share.name === "gas_energy" ? "bar gas" : "bar" }),
       line(x(share.lower), y + 21.5, x(share.upper), y + 21.5, "whisker"),
-      label(x(share.upper) + 7, y + 25.5, `${(100 * value).toFixed(1)}\u00a0%  (${(100 * share.lower).toFixed(1)}\u2013${(100 * share.upper).toFixed(1)})`, "start", "bar-value"),
+      label(x(share.upper) + 7, y + 25.5, `${shown(value)}\u00a0% (${shown(share.lower)} to ${shown(share.upper)})`, "start", "bar-value"),
     );
   });
   return { svg };

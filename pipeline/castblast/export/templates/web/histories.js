@@ -28,7 +28,7 @@ export function historyOf(kind, full) {
   const at = (sign) => [0, ...logs.map((y, i) => Math.exp(y + sign * record.band[i]))];
   const shares = record.energy.map(({ name, title, band }, j) => {
     const value = found[record.modes.length + j];
-    return { name, title, value, lower: Math.max(0, value - band), upper: value + band };
+    return { name, title, value, band, lower: Math.max(0, value - band), upper: Math.max(0, value + band) };
   });
   const inside = record.inputs.every(({ name, lower, upper }) => full[name] >= lower && full[name] <= upper);
   return { time: [0, ...record.times.map((t) => t * rise)], pressure: at(0), lower: at(-1), upper: at(1), shares, inside };
