@@ -12,6 +12,7 @@ from castblast.cli import (
     predict,
     simulate,
     surrogates,
+    web,
 )
 
 app = typer.Typer(
@@ -41,7 +42,7 @@ def _options(
     """Take the options that stand before a verb."""
 
 
-for _module in (demo, predict, simulate, generate, surrogates, infill, muckpile):
+for _module in (demo, predict, simulate, generate, surrogates, infill, muckpile, web):
     _module.add_to(app)
 app.add_typer(datasets.app, name="dataset")
 app.add_typer(explosive.app, name="explosive")

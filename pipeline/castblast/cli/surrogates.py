@@ -176,20 +176,30 @@ def export(
     to: Annotated[
         str,
         typer.Option(
-            help="Targets, separated by commas: json, onnx, c, js, python, pfc, lammps, excel; "
-            "or all."
+            help="Targets, separated by commas: json, onnx, c, js, python, pfc, lammps, excel, "
+            "web; or all."
         ),
     ] = "json,onnx",
     verify: Annotated[
         bool,
         typer.Option(help="Run every export on golden rows and compare (exit code 4: differs)."),
     ] = True,
+    histories: Annotated[
+        Path | None,
+        typer.Option(
+            help="For web: dataset (netCDF) whose pressure histories the page shows, or a "
+            "histories.json; default: the one beside the network.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> Mapping[str, Any]:
     """Write the network for other tools and prove that it gives the same numbers."""
     from castblast.stages.export import export as run
 
     with screen.progress("export") as progress:
-        outcome = run(fit, out, targets=to.split(","), verify=verify, progress=progress)
+        outcome = run(
+            fit, out, targets=to.split(","), verify=verify, histories=histories, progress=progress
+        )
     for line in outcome.lines:
         screen.say(line)
     return outcome.document

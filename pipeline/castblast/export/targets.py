@@ -14,6 +14,7 @@ from castblast.export.onnx_file import to_onnx
 from castblast.export.plain import Files
 from castblast.export.python_source import to_python
 from castblast.export.runners import Runner, run_c, run_js, run_json, run_onnx, run_python
+from castblast.export.web import run_web, to_web
 from castblast.export.workbook import to_excel
 from castblast.export.workbook_runner import run_excel
 from castblast.network import Network
@@ -43,4 +44,5 @@ TARGETS: dict[str, Target] = {
     "pfc": Target(to_pfc, run_pfc),
     "lammps": Target(to_lammps, run_lammps),
     "excel": Target(to_excel, run_excel),
+    "web": Target(to_web, run_web),
 }

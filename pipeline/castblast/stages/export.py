@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 #: Every target; `all` stands for them together.
-TARGET_NAMES = ("json", "onnx", "c", "js", "python", "pfc", "lammps", "excel")
+TARGET_NAMES = ("json", "onnx", "c", "js", "python", "pfc", "lammps", "excel", "web")
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,7 @@ def export(
     targets: Sequence[str] = ("json", "onnx"),
     verify: bool = True,
     parity: Path | None = None,
+    histories: Path | None = None,
     progress: ProgressCallback = silent,
 ) -> ExportOutcome:
     """Write the network of a fit.
@@ -57,6 +58,8 @@ def export(
         be run here, for want of a compiler say, is written and said to be not verified.
     parity : path, optional
         Where to write the deviations found (JSON).
+    histories : path, optional
+        For the web page, see `castblast.stages.web.read_histories`.
 
     Raises
     ------
@@ -70,7 +73,7 @@ def export(
     network = read_network(source)
     folder = source.parent / "export" if out is None else out
     _require_writable(folder)
-    contents = _write(network, wanted)
+    contents = _write(network, wanted, source, histories)
     reports = _verify(network, contents, progress) if verify else {}
     files, lines = [], []
     for name, content in {k: v for part in contents.values() for k, v in part.items()}.items():
@@ -87,14 +90,21 @@ def export(
     return ExportOutcome(document, lines, files)
 
 
-def _write(network: Network, wanted: Sequence[str]) -> dict[str, dict[str, bytes]]:
+def _write(
+    network: Network, wanted: Sequence[str], source: Path, histories: Path | None
+) -> dict[str, dict[str, bytes]]:
     """Files of every target, all faults at once."""
     from castblast.export.targets import TARGETS
+    from castblast.stages.web import build_page
 
     contents, faults = {}, []
     for target in wanted:
         try:
-            contents[target] = TARGETS[target].write(network)
+            contents[target] = (
+                build_page(network, source, histories)
+                if target == "web"
+                else TARGETS[target].write(network)
+            )
         except SpecError as fault:
             faults.append(str(fault))
     if faults:

@@ -1,0 +1,78 @@
+/* Every number of the page with its band. */
+import { network, predictRow } from "../model.js";
+import { completed, inputNames } from "./design.js";
+
+const gravity = 9.81;
+const outputTitles = {
+  burden_velocity: "Burden velocity", equilibrium_pressure: "Equilibrium pressure",
+  expanded_hole_radius: "Expanded hole radius", crushed_zone_radius: "Crushed zone radius",
+};
+
+/** Mean way of a bench thrown level: 2/3 of the reach of its crest (castblast.muckpile.ballistic). */
+export function throwDistance(speed, height) {
+  return (2 / 3) * speed * Math.sqrt((2 * height) / gravity);
+}
+
+/** Predict by names; raw answer of the model with names. */
+export function predicted(design) {
+  const position = network.explosives.indexOf(design.explosive);
+  return predictRow(position, inputNames.map((name) => design.values[name]));
+}
+
+/**
+ * Results of a design: key, variable (for the unit), title, value, lower, upper, note;
+ * `exact` marks what is input or arithmetic and has no error of the surrogate.
+ */
+export function resultsOf(design) {
+  const answer = predicted(design);
+  const full = completed(design);
+  const explosive = facts.explosives[design.explosive];
+  const rows = network.outputs.map(({ name, title, band }, j) => ({
+    key: name, variable: name, title: outputTitles[name] ?? sentence(title), exact: false,
+    value: answer.values[j], lower: answer.lower[j], upper: answer.upper[j],
+    note: `Surrogate, \u00b1\u00a0${percent(band)}`,
+  }));
+  const speed = rows.find(({ key }) => key === "burden_velocity");
+  if (speed) {
+    const way = (v) => throwDistance(v, full.bench_height);
+    rows.push({
+      key: "throw_distance", variable: "burden", title: "Mean throw", exact: false,
+      value: way(speed.value), lower: way(speed.lower), upper: way(speed.upper),
+      note: "Free flight, band of the velocity only",
+    });
+  }
+  const exact = (key, variable, title, value, note) => {
+    if (Number.isFinite(value)) rows.push({ key, variable, title, value, lower: value, upper: value, note, exact: true });
+  };
+  if (explosive) {
+    const charge = explosive.density * (Math.PI / 4) * full.charge_diameter ** 2 * full.charge_length;
+    const rock = full.spacing * full.mean_burden * full.bench_height;
+    exact("powder_factor", "powder_factor", "Powder factor", charge / rock, "Geometry, exact");
+    exact("cj_pressure", "explosion_pressure", "CJ pressure", explosive.cjPressure, "Explosive data, exact");
+    if (full.charge_diameter === full.hole_diameter) {
+      exact("explosion_pressure", "explosion_pressure", "Explosion pressure", explosive.explosionPressure, "Explosive data, exact");
+    }
+  }
+  return { rows, full, domain: answer.domain, offending: inputNames.filter((_, i) => answer.offending[i]), score: answer.score };
+}
+
+/** Least and greatest velocity while one input goes over its trained range; the others stay. */
+export function sensitivityOf(design, output = "burden_velocity", steps = 40) {
+  const j = network.outputs.findIndex(({ name }) => name === output);
+  if (j < 0) return [];
+  return network.inputs.map((column) => {
+    const { name, lower, upper, log } = column;
+    const points = [];
+    for (let k = 0; k <= steps; k += 1) {
+      const share = k / steps;
+      const x = k === 0 ? lower : k === steps ? upper : log ? lower * (upper / lower) ** share : lower + share * (upper - lower);
+      const answer = predicted({ explosive: design.explosive, values: { ...design.values, [name]: x } });
+      points.push({ x, value: answer.values[j], lower: answer.lower[j], upper: answer.upper[j], domain: answer.domain });
+    }
+    const trusted = points.filter(({ domain }) => domain === "inside");
+    if (!trusted.length) return { name, low: null, high: null, size: 0 };
+    const low = trusted.reduce((a, b) => (b.value < a.value ? b : a));
+    const high = trusted.reduce((a, b) => (b.value > a.value ? b : a));
+    return { name, low, high, size: high.value - low.value };
+  }).sort((a, b) => b.size - a.size);
+}

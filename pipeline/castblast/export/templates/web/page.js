@@ -1,0 +1,171 @@
+/* The page: one state, drawn whenever it changes. */
+import { network, selfTest } from "../model.js";
+import { answerBatch, batchTemplate, csvText } from "./batch.js";
+import { buildControls, buildTabs, showValue } from "./controls.js";
+import { domainWords } from "./domain.js";
+import { resultsOf, sensitivityOf } from "./answers.js";
+import { firstDesign, fromHash, inputNames, toHash } from "./design.js";
+import { htmlNode } from "./drawing.js";
+import { benchFigure, energyFigure, holeFigure, place, pressureFigure, tornadoFigure } from "./figures.js";
+
+const at = (id) => document.getElementById(id);
+const noHistories = "The pressure histories of the dataset did not come with this page.";
+const state = { design: firstDesign(), kept: null, system: "metric" };
+let pending = 0;
+
+const usable = (design) => inputNames.every((name) => Number.isFinite(design.values[name]));
+const copyOf = ({ explosive, values }) => ({ explosive, values: { ...values } });
+
+function showResults(result, other) {
+  const { system } = state;
+  const cell = (row) => htmlNode(
+    "li", { class: row.exact ? "result exact" : "result" },
+    htmlNode("span", { class: "name" }, row.title),
+    htmlNode("output", { class: "value", id: `value-${row.key}`, "data-si": row.value, "data-lower": row.lower, "data-upper": row.upper }, withUnit(row.variable, row.value, system)),
+    htmlNode("span", { class: "range" }, row.exact ? row.note : `${digits(row.lower * unitOf(row.variable, system).factor)} to ${withUnit(row.variable, row.upper, system)}`),
+    ...(other ? [difference(row, other)] : []),
+  );
+  at("results").replaceChildren(...result.rows.map(cell));
+  const speed = result.rows.find(({ key }) => key === "burden_velocity");
+  at("glance").textContent = speed ? `${speed.title} ${withUnit(speed.variable, speed.value, system)} (${digits(speed.lower * unitOf(speed.variable, system).factor)} to ${digits(speed.upper * unitOf(speed.variable, system).factor)})` : "";
+}
+
+function difference(row, other) {
+  const old = other.rows.find(({ key }) => key === row.key);
+  if (!old) return htmlNode("span", { class: "difference" }, "");
+  const change = row.value / old.value - 1;
+  const ends = row.exact ? "" : ` (${signed(row.lower / old.upper - 1)} to ${signed(row.upper / old.lower - 1)})`;
+  return htmlNode("span", { class: "difference" }, `${signed(change)} on ${withUnit(row.variable, old.value, state.system)}${ends}`);
+}
+
+const signed = (share) => `${share < 0 ? "\u2212" : "+"}${Math.abs(100 * share).toFixed(1)}\u00a0%`;
+
+function showDomain(result) {
+  const { title, text, reasons } = domainWords(state.design, result, state.system);
+  const badge = at("domain");
+  badge.dataset.domain = at("glance").dataset.domain = result.domain;
+  badge.replaceChildren(
+    htmlNode("strong", {}, title), htmlNode("span", {}, ` ${text}`),
+    ...(reasons.length ? [htmlNode("ul", {}, ...reasons.map((reason) => htmlNode("li", {}, reason)))] : []),
+  );
+  at("results-panel").dataset.domain = result.domain;
+}
+
+function showFigures(result) {
+  const { design, kept, system } = state;
+  const pressure = pressureFigure(design, kept, system);
+  place("pressure-figure", pressure, noHistories);
+  place("energy-figure", energyFigure(design), noHistories);
+  place("bench-figure", benchFigure(result, system), "This network gives no burden velocity.");
+  const hole = holeFigure(result, system);
+  place("hole-figure", hole, "");
+  at("hole-legend").replaceChildren(...hole.legend.map(([kind, title, radius, row, variable]) => htmlNode(
+    "li", {}, htmlNode("i", { class: kind }), `${title}: ${withUnit(variable, radius, system, 3)}`,
+    row ? ` (${digits(row.lower * unitOf(variable, system).factor)} to ${digits(row.upper * unitOf(variable, system).factor)})` : " (given)",
+  )));
+  const speed = result.rows.find(({ key }) => key === "burden_velocity");
+  place("tornado-figure", speed ? tornadoFigure(sensitivityOf(design), speed.value, system) : null, "No part of any range lies inside the training domain here.");
+}
+
+function showNothing() {
+  const names = inputNames.filter((name) => !Number.isFinite(state.design.values[name])).map(titleOf);
+  const badge = at("domain");
+  badge.dataset.domain = at("glance").dataset.domain = "invalid";
+  at("glance").textContent = "No answer: see the marked input";
+  badge.replaceChildren(htmlNode("strong", {}, "No answer"), htmlNode("span", {}, ` Not a usable number: ${names.join(", ")}.`));
+  at("results-panel").dataset.domain = "invalid";
+  at("results").replaceChildren();
+  at("hole-legend").replaceChildren();
+  for (const id of ["pressure-figure", "energy-figure", "bench-figure", "hole-figure", "tornado-figure"]) place(id, null, "No answer: an input is not a usable number.");
+}
+
+function showSummary(full) {
+  const parts = [["stemming length", "stemming_length"], ["charge length", "charge_length"], ["spacing", "spacing"]].filter(([, name]) => !inputNames.includes(name));
+  at("derived").textContent = parts.map(([title, name]) => `${sentence(title)} ${withUnit(name, full[name], state.system, 3)}`).join(" \u00b7 ");
+}
+
+/* Draw everything; the link is written a little later, as browsers limit how often that may be. */
+function draw() {
+  for (const tab of at("explosives").children) {
+    const chosen = tab.id === `tab-${state.design.explosive}`;
+    tab.setAttribute("aria-selected", chosen);
+    tab.tabIndex = chosen ? 0 : -1;
+    if (chosen) at("results-panel").setAttribute("aria-labelledby", tab.id);
+  }
+  at("forget").hidden = !state.kept;
+  at("keep").disabled = !usable(state.design);
+  if (!usable(state.design)) return showNothing();
+  const result = resultsOf(state.design);
+  showResults(result, state.kept ? resultsOf(state.kept) : null);
+  showDomain(result);
+  showFigures(result);
+  showSummary(result.full);
+  clearTimeout(pending);
+  pending = setTimeout(() => history.replaceState(null, "", toHash(state.design, state.kept, state.system)), 150);
+  return result;
+}
+
+function change(name, value, source) {
+  state.design.values[name] = value;
+  showValue(name, value, state.system, source === "field");
+  draw();
+}
+
+function rebuild() {
+  buildControls(state.system, change);
+  at("units").value = state.system;
+  for (const name of inputNames) showValue(name, state.design.values[name], state.system, false);
+  draw();
+}
+
+function restore() {
+  const { design, kept, system } = fromHash(location.hash);
+  if (location.hash.length > 1 && !design) at("notice").textContent = "The link holds no complete design for this model; the usual design is shown.";
+  state.design = design ?? state.design;
+  state.kept = kept;
+  state.system = system ?? state.system;
+  rebuild();
+}
+
+function download(name, text) {
+  const link = htmlNode("a", { href: URL.createObjectURL(new Blob([text], { type: "text/csv" })), download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
+function runBatch(text) {
+  const start = performance.now();
+  const { header, rows, faults } = answerBatch(text);
+  const seconds = (performance.now() - start) / 1000;
+  state.batch = csvText(header, rows);
+  at("batch-save").disabled = rows.length === 0;
+  const counts = ["inside", "unusual", "outside"].map((kind) => `${rows.filter((row) => row.at(-2) === kind).length} ${kind}`);
+  at("batch-status").textContent = `${rows.length} designs in ${digits(seconds, 2)} s: ${counts.join(", ")}.${faults.length ? ` ${faults.length} faults.` : ""}`;
+  at("batch-faults").replaceChildren(...faults.slice(0, 20).map((fault) => htmlNode("li", {}, fault)));
+  return { rows: rows.length, faults, seconds };
+}
+
+buildTabs((name) => { state.design.explosive = name; draw(); });
+at("units").replaceChildren(...Object.entries(systems).map(([key, title]) => htmlNode("option", { value: key }, title)));
+at("units").addEventListener("change", () => { state.system = at("units").value; rebuild(); });
+at("keep").addEventListener("click", () => { state.kept = copyOf(state.design); draw(); });
+at("forget").addEventListener("click", () => { state.kept = null; draw(); at("keep").focus(); });
+at("print").addEventListener("click", () => window.print());
+at("copy").addEventListener("click", async () => {
+  history.replaceState(null, "", toHash(state.design, state.kept, state.system));
+  try { await navigator.clipboard.writeText(location.href); at("notice").textContent = "Link copied."; } catch { at("notice").textContent = "The link of this design stands in the address bar."; }
+});
+at("batch-template").addEventListener("click", () => download("designs.csv", batchTemplate(state.design)));
+at("batch-save").addEventListener("click", () => download("answers.csv", state.batch));
+at("batch-file").addEventListener("change", async () => { const file = at("batch-file").files[0]; if (file) runBatch(await file.text()); });
+window.addEventListener("hashchange", restore);
+if (facts.histories) {
+  const { rows, pressure_error_50: half, pressure_error_95: most, inside_band: covered, share_error_95: share } = facts.histories.held_out;
+  at("history-error").textContent = `From simulated histories, by principal components: on ${rows} designs that the fit has not seen, half of all points are within ${percent(half)} and 95 % within ${percent(most)} of the simulated pressure; the shaded band holds ${percent(covered, 3)} of them. Energy shares: 95 % within ${percent(share)} of the energy of the explosive.`;
+}
+restore();
+const deviation = selfTest();
+at("self-test").textContent = deviation < 1e-12 ? `Self-test passed: golden rows reproduced to ${deviation.toExponential(1)}.` : `Self-test FAILED (${deviation.toExponential(1)}): do not use this page in this browser.`;
+at("self-test").classList.toggle("failed", !(deviation < 1e-12));
+/** For scripts and tests. */
+window.castblast = { state, resultsOf, sensitivityOf, answerBatch, runBatch, batchTemplate, network };

@@ -1,0 +1,130 @@
+"""`Network` to a web page: one HTML file that works from disk with the network off.
+
+The page carries the module that `to_javascript` writes, so its numbers are the numbers of every
+other copy; the scripts beside it only ask, draw and explain. A policy inside the page forbids
+every request to elsewhere.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from castblast.errors import SpecError
+from castblast.export.answers import Answers
+from castblast.export.javascript import to_javascript
+from castblast.export.plain import Files, compact, render
+from castblast.export.runners import Index, run_js
+from castblast.network import Floats, Network
+from castblast.variables import STEMMING_RATIO, VARIABLES
+
+PAGE = "index.html"
+_FOLDER = Path(__file__).parent / "templates" / "web"
+#: In the order in which they need each other; names at their top level differ.
+_SCRIPTS = (
+    "units", "design", "histories", "answers", "domain", "drawing", "figures", "batch", "controls",
+    "page",
+)  # fmt: skip
+_IMPORT = re.compile(r"^import .*?;\n", re.MULTILINE | re.DOTALL)
+_EXPORT = re.compile(r"^export ", re.MULTILINE)
+_BEGIN, _END = "/* model.js begins */\n", "/* model.js ends */\n"
+
+
+def to_web(network: Network, histories: Mapping[str, Any] | None = None) -> Files:
+    """Write ``index.html``.
+
+    Parameters
+    ----------
+    network : Network
+    histories : mapping, optional
+        What `castblast.surrogate.history_modes.fit_history_modes` gives; without it the page has
+        no pressure-time curve and no energy bars, and says so.
+    """
+    model = to_javascript(network)["model.js"].decode()
+    facts = json.dumps(_facts(network, histories), separators=(",", ":"), allow_nan=False)
+    script = f"{_BEGIN}{model}{_END}const facts = {facts};\n" + "".join(map(_script, _SCRIPTS))
+    text = render(
+        "web/page.html.j2",
+        n=compact(network),
+        held=_held_lines(network),
+        css=(_FOLDER / "page.css").read_text(encoding="utf-8"),
+        # A script ends at the first such tag, wherever it stands.
+        script=script.replace("</", "<\\/"),
+    )
+    return {PAGE: text}
+
+
+def run_web(network: Network, files: Files, numeric: Floats, index: Index) -> tuple[Answers, str]:
+    """Take the model out of the page and run it in node."""
+    text = files[PAGE].decode().split(_BEGIN)[1].split(_END)[0]
+    found, tool = run_js(network, {"model.js": text.encode()}, numeric, index)
+    return found, f"{tool}, taken out of the page"
+
+
+def _script(name: str) -> str:
+    """One module without imports and exports: in the page they share one scope."""
+    text = (_FOLDER / f"{name}.js").read_text(encoding="utf-8")
+    return _EXPORT.sub("", _IMPORT.sub("", text))
+
+
+def _facts(network: Network, histories: Mapping[str, Any] | None) -> dict[str, Any]:
+    """What the page knows beside the network."""
+    held = network.provenance.get("held_inputs", {})
+    return {
+        "explosives": {name: _explosive(name) for name in network.explosives},
+        "held": {name: value for name, value in held.items() if name in VARIABLES},
+        "defaults": {n: v.default for n, v in VARIABLES.items() if v.default is not None},
+        "stemmingRatio": STEMMING_RATIO,
+        "variables": {
+            name: {
+                "title": v.long_name.split(";")[0],
+                "unit": v.unit,
+                "shown": v.shown_unit,
+                "factor": v.display_factor,
+                "role": v.role,
+                "lower": v.lower,
+                "upper": v.upper,
+            }
+            for name, v in VARIABLES.items()
+        },
+        "scores": network.provenance.get("scores", {}).get("test", {}),
+        "histories": histories,
+    }
+
+
+def _held_lines(network: Network) -> list[str]:
+    """What was held in training, for people; solver settings are no part of a design."""
+    held = network.provenance.get("held_inputs", {})
+    lines = []
+    for name, value in held.items():
+        variable = VARIABLES.get(name)
+        if variable is not None and variable.role != "solver":
+            title = variable.long_name.split(";")[0]
+            shown = variable.show(value).replace("kg m-3", "kg/m3").replace("m s-1", "m/s")
+            lines.append(f"{title[0].upper()}{title[1:]}: {shown}")
+    return lines
+
+
+def _explosive(name: str) -> dict[str, float] | None:
+    """Numbers of a catalogue explosive in SI; None if the catalogue does not have it."""
+    from castblast.explosive.isentrope import pressure
+    from castblast.specs.explosive import load_explosive
+
+    try:
+        spec = load_explosive(name)
+        explosive = spec.to_explosive()
+    except SpecError:
+        return None
+    state = spec.cj_state()
+    numbers = {
+        "density": explosive.density,
+        "detonationVelocity": explosive.detonation_velocity,
+        "explosionPressure": float(pressure(explosive.isentrope, 1.0)),
+        "totalEnergy": explosive.total_energy,
+        "diameterCoefficient": explosive.diameter_coefficient,
+        "diameterExponent": explosive.diameter_exponent,
+    }
+    return numbers | ({} if state is None else {"cjPressure": state.pressure})
