@@ -39,8 +39,9 @@ PEERS = {
 
 #: A fresh interpreter, so that its peak memory is that of the run alone.
 RUN = """
-import json, resource, sys, time
+import json, sys, time
 import numpy as np
+from castblast.dataset.meter import peak_memory
 from castblast.muckpile.bench import Bench
 from castblast.muckpile.contact import ContactLaw
 from castblast.muckpile.particles import particles_at_rest
@@ -66,7 +67,7 @@ print(json.dumps({
     "balls": count, "Mps/s": 1e-6 * count * made / seconds,
     "core ns per contact": 1e9 * cores * seconds / (made * contacts),
     "contacts per ball": contacts / count, "renewals": run.rebuilds - rebuilds,
-    "bytes per ball": 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / count,
+    "bytes per ball": peak_memory() / count,
     "energy": run.translational_energy(),
 }))
 """
