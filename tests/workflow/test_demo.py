@@ -43,6 +43,8 @@ def test_demo(tmp_path: Path) -> None:
     report = (demo.out / "report.html").read_text(encoding="utf-8")
     assert "What is left out" in report
     assert not re.findall(r'(?:src|href)="(?!data:|#)', report), "the report must stand alone"
+    page = (demo.out / "export" / "index.html").read_text(encoding="utf-8")
+    assert '"format":"castblast history modes"' in page
     assert summarise(demo)["prediction"]["simulated"]["burden_velocity"] > 0
     second = {step.title: step.run(demo, silent) for step in STEPS}
     for title in ("surrogate", "prediction against physics", "muckpile"):

@@ -121,7 +121,10 @@ def _export(demo: Demo, progress: ProgressCallback) -> list[str]:
     from castblast.stages.export import export
 
     progress(0.0, "writing and verifying")
-    return export(demo.out / "models", demo.network.parent).lines
+    targets = ("json", "onnx", "web")
+    return export(
+        demo.out / "models", demo.network.parent, targets=targets, histories=demo.dataset
+    ).lines
 
 
 def _predict(demo: Demo, progress: ProgressCallback) -> list[str]:

@@ -86,8 +86,7 @@ def read_histories(path: Path) -> Mapping[str, Any]:
     if path.suffix != ".json":
         from castblast.dataset.store import open_dataset
 
-        with open_dataset(path) as dataset:
-            return fit_history_modes(dataset)
+        return fit_history_modes(open_dataset(path))
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
         known = record["format"] == FORMAT
