@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import re
 import shutil
-import subprocess
 from math import pi
 
 import numpy as np
 import pytest
+from deck_cases import run_engine, two_blocks
 
 from castblast.errors import SpecError
 from castblast.export.deck import plan_firings, radius_types, time_step
@@ -24,39 +24,15 @@ from castblast.export.lammps_deck import (
 from castblast.muckpile.bench import Bench
 from castblast.muckpile.case import CastCase
 from castblast.muckpile.contact import ContactLaw
-from castblast.muckpile.particles import particles_at_rest
 from castblast.muckpile.solver import run_cast
 from castblast.muckpile.terrain import heightmap
-from castblast.muckpile.walls import bench_walls, join, plane, rectangle, slope
+from castblast.muckpile.walls import bench_walls, join, rectangle
 
 LAW = ContactLaw(cap_on_total=True, dashpot_mode=1)
 
 
 def small_case(**changes) -> CastCase:
-    rng = np.random.default_rng(1)
-    x, y, z = np.meshgrid(
-        np.arange(6) * 0.25 - 1.45,
-        np.arange(5) * 0.25 + 0.13,
-        np.arange(8) * 0.245 + 0.125,
-        indexing="ij",
-    )
-    position = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
-    position += rng.uniform(-0.005, 0.005, position.shape)
-    radius = rng.choice([0.08, 0.10, 0.12], len(position))
-    walls = join(
-        plane((0, 0, 0), (0, 0, 1)),
-        plane((0, 0, 0), (0, 1, 0), 0.0),
-        plane((0, 1.25, 0), (0, -1, 0), 0.0),
-        plane((-1.6, 0, 0), (1, 0, 0)),
-        slope(2.0, pi / 6.0),
-    )
-    case = CastCase(
-        particles_at_rest(position, radius, (position[:, 0] < -0.7).astype(int)),
-        LAW,
-        walls,
-        np.array([0.0, 0.06]),
-        np.array([[4.0, 0.0, 1.0], [3.0, 0.0, 0.0]]),
-    )
+    case = two_blocks(LAW, [0.0, 0.06], [[4.0, 0.0, 1.0], [3.0, 0.0, 0.0]])
     return case._replace(**changes)
 
 
@@ -186,12 +162,7 @@ def test_lammps_throws_the_same_pile(tmp_path):
     """
     case = small_case()
     write_lammps_deck(tmp_path, case)
-    done = subprocess.run(
-        ["lmp", "-in", "cast.in", "-log", "log.lammps"],
-        cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout[-500:]
-    lines = (tmp_path / "log.lammps").read_text().splitlines()
+    lines = run_engine("lmp", tmp_path).splitlines()
     rows = [line.split() for line in lines if re.match(r"^\s*\d+\s+\S+\s+240\s+\S+\s*$", line)]
     time, energy = np.array(rows, dtype=float)[:, [1, 3]].T
     own = run_cast(case)

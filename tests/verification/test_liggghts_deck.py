@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import re
 import shutil
-import subprocess
 from math import atan2, exp, pi, sqrt
 from pathlib import Path
 
 import numpy as np
 import pytest
+from deck_cases import run_engine, two_blocks
 
 from castblast.errors import SpecError
 from castblast.export.deck import read_loop_times
@@ -26,21 +26,12 @@ from castblast.muckpile.contact import ContactLaw
 from castblast.muckpile.particles import particles_at_rest
 from castblast.muckpile.solver import run_cast
 from castblast.muckpile.terrain import heightmap
-from castblast.muckpile.walls import bench_walls, floor, join, plane, slope
+from castblast.muckpile.walls import bench_walls, floor, join, slope
 
 needs_liggghts = pytest.mark.skipif(
     shutil.which("liggghts") is None, reason="LIGGGHTS (liggghts) is not installed"
 )
 NO_BLOCKS = (np.zeros(0), np.zeros((0, 3)))
-
-
-def run_liggghts(folder: Path) -> str:
-    done = subprocess.run(
-        ["liggghts", "-in", "cast.in", "-log", "log.liggghts"],
-        cwd=folder, capture_output=True, text=True, timeout=120, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout[-500:]
-    return (folder / "log.liggghts").read_text()
 
 
 def final_state(folder: Path) -> np.ndarray:
@@ -50,36 +41,12 @@ def final_state(folder: Path) -> np.ndarray:
     return rows[np.argsort(ball)]
 
 
-def two_blocks() -> CastCase:
-    """240 balls of three radii in two blocks between mirrors, before a slope."""
-    rng = np.random.default_rng(1)
-    x, y, z = np.meshgrid(
-        np.arange(6) * 0.25 - 1.45,
-        np.arange(5) * 0.25 + 0.13,
-        np.arange(8) * 0.245 + 0.125,
-        indexing="ij",
-    )
-    position = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
-    position += rng.uniform(-0.005, 0.005, position.shape)
-    radius = rng.choice([0.08, 0.10, 0.12], len(position))
-    walls = join(
-        floor(),
-        plane((0, 0, 0), (0, 1, 0), 0.0),
-        plane((0, 1.25, 0), (0, -1, 0), 0.0),
-        plane((-1.6, 0, 0), (1, 0, 0)),
-        slope(2.0, pi / 6.0),
-    )
-    return CastCase(
-        particles_at_rest(position, radius, (position[:, 0] < -0.7).astype(int)),
-        ContactLaw(),
-        walls,
-        np.array([0.06, 0.0]),
-        np.array([[3.0, 0.0, 0.0], [4.0, 0.0, 1.0]]),
-    )
+def thrown() -> CastCase:
+    return two_blocks(ContactLaw(), [0.06, 0.0], [[3.0, 0.0, 0.0], [4.0, 0.0, 1.0]])
 
 
 def test_atoms_are_numbered_as_they_are_fired_and_the_law_is_that_of_their_types(tmp_path):
-    case = two_blocks()
+    case = thrown()
     write_liggghts_deck(tmp_path, case, steps=100)
     words = (tmp_path / "cast.in").read_text()
     order = np.loadtxt(tmp_path / "balls.csv", delimiter=",", skiprows=1)[:, 1].astype(int)
@@ -127,7 +94,7 @@ def test_walls_become_planes_and_triangles_within_reach():
 
 
 def test_a_shear_dashpot_that_acts_while_slipping_is_refused(tmp_path):
-    case = two_blocks()
+    case = thrown()
     with pytest.raises(SpecError, match="LIGGGHTS deck: dashpot_mode = 1"):
         write_liggghts_deck(tmp_path, case._replace(law=ContactLaw(dashpot_mode=1)))
     assert not list(tmp_path.iterdir())
@@ -149,7 +116,7 @@ def test_liggghts_bounces_and_rolls_a_ball_as_theory_says(tmp_path):
     ball = particles_at_rest([[0.0, 0.0, 0.1]], radius, velocity=[[0.0, 0.0, -1.0]])
     bounce = CastCase(ball, law, floor(), *NO_BLOCKS, gravity=0.0, time_step=1e-5)
     write_liggghts_deck(tmp_path / "bounce", bounce, steps=2000)
-    run_liggghts(tmp_path / "bounce")
+    run_engine("liggghts", tmp_path / "bounce")
     assert final_state(tmp_path / "bounce")[0, 8] == pytest.approx(restitution, rel=2e-3)
 
     weight = 4.0 / 3.0 * pi * 0.1**3 * law.density * 9.81
@@ -158,7 +125,7 @@ def test_liggghts_bounces_and_rolls_a_ball_as_theory_says(tmp_path):
     ball.angular_velocity[0, 1] = 10.0
     roll = CastCase(ball, law, floor(), *NO_BLOCKS, time_step=1e-4)
     write_liggghts_deck(tmp_path / "roll", roll, steps=20000)
-    run_liggghts(tmp_path / "roll")
+    run_engine("liggghts", tmp_path / "roll")
     assert final_state(tmp_path / "roll")[0, 3] == pytest.approx(0.7 / (0.1 * 9.81), rel=3e-3)
 
 
@@ -168,9 +135,9 @@ def test_liggghts_throws_the_same_pile(tmp_path):
 
     Mass centre and median place of the mass within 0.1 m, mean height to 5 per cent.
     """
-    case = two_blocks()
+    case = thrown()
     write_liggghts_deck(tmp_path, case)
-    log = run_liggghts(tmp_path)
+    log = run_engine("liggghts", tmp_path)
     rows = re.findall(r"^ *\d+ +(\S+) +240 +(\S+) *$", log, re.MULTILINE)
     time, energy = np.array(rows, dtype=float).T
     own = run_cast(case)
@@ -203,7 +170,9 @@ def test_a_packed_block_that_is_fired_is_not_braked_by_the_deck(tmp_path):
         max_time=0.03, sample_interval=1e-3,
     )  # fmt: skip
     write_liggghts_deck(tmp_path, case)
-    rows = re.findall(r"^ *\d+ +(\S+) +216 +(\S+) *$", run_liggghts(tmp_path), re.MULTILINE)
+    rows = re.findall(
+        r"^ *\d+ +(\S+) +216 +(\S+) *$", run_engine("liggghts", tmp_path), re.MULTILINE
+    )
     time, energy = np.array(rows, dtype=float).T
     limits = ContactLaw(cap_on_total=True)
     own = run_cast(case._replace(law=limits, time_step=2e-5)).history
@@ -214,10 +183,10 @@ def test_a_packed_block_that_is_fired_is_not_braked_by_the_deck(tmp_path):
 
 @needs_liggghts
 def test_loop_times_are_read_from_the_log(tmp_path):
-    case = two_blocks()._replace(block_delay=NO_BLOCKS[0], block_velocity=NO_BLOCKS[1])
+    case = thrown()._replace(block_delay=NO_BLOCKS[0], block_velocity=NO_BLOCKS[1])
     balls = case.particles._replace(block=np.full(240, -1))
     write_liggghts_deck(tmp_path, case._replace(particles=balls), radius_bins=1, steps=50)
-    run_liggghts(tmp_path)
-    (first,) = read_loop_times(tmp_path / "log.liggghts")
+    run_engine("liggghts", tmp_path)
+    (first,) = read_loop_times(tmp_path / "log.engine")
     assert first.seconds > 0.0
     assert (first.processes, first.steps, first.balls) == (1, 50, 240)
