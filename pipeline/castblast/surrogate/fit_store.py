@@ -147,8 +147,8 @@ def open_fit(path: Path) -> Fit:
     Raises
     ------
     SpecError
-        The file is damaged, needs what is missing here, or was written by other code, with which the
-        fit may answer otherwise than when it was trained.
+        The file is damaged, needs what is missing here, or was written by other code, with which
+        the fit may answer otherwise than when it was trained.
     """
     stored = _unpickle(path.read_bytes())
     spec = stored.get("spec") if isinstance(stored, dict) else None
