@@ -98,7 +98,7 @@ def neighbours():
 TRAINING = "{adam_epochs: 2, max_iterations: 15}"
 #: Activations that onnxruntime lacks in float64, and others.
 ACTIVATIONS = (
-    "ELU", "SELU", "LeakyReLU", "PReLU", "Softplus", "Mish", "Hardswish", "ReLU6", "Softsign",
+    "ELU", "GELU", "SELU", "LeakyReLU", "PReLU", "Softplus", "Mish", "Hardswish", "ReLU6",
 )  # fmt: skip
 Make = Callable[..., tuple[Fit, Path]]
 
@@ -116,7 +116,7 @@ def make(table, tmp_path_factory) -> Make:
     made: dict[str, tuple[Fit, Path]] = {}
 
     def fit(factory: str, options: str = "{}", training: str = TRAINING) -> tuple[Fit, Path]:
-        name = f"{factory}_{len(made)}"
+        name = f"{factory.lower()}_{len(made)}"
         if factory + options not in made:
             path = folder / f"{name}.yaml"
             path.write_text(
@@ -228,8 +228,8 @@ def test_what_is_neither_chain_nor_module_is_told(make: Make, tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("factory", "message"),
     [
-        ("RootMeanSquare", r"RootMeanSquare_\d+: torch.onnx cannot export .*rms_norm.*[^\n]$"),
-        ("Single", r"Single_\d+: ONNX core: .*Cast.* is computed in float32"),
+        ("RootMeanSquare", r"rootmeansquare_\d+: torch.onnx cannot export .*rms_norm.*[^\n]$"),
+        ("Single", r"single_\d+: ONNX core: .*Cast.* is computed in float32"),
     ],
 )
 def test_what_cannot_be_exported_is_told_in_a_line(
@@ -244,12 +244,8 @@ def test_what_cannot_be_exported_is_told_in_a_line(
 
 def test_a_fixed_number_of_rows_is_seen(make: Make, tmp_path: Path) -> None:
     _, folder = make("Fixed")
-    with (
-        pytest.warns(torch.jit.TracerWarning),
-        pytest.raises(
-            CheckError, match=r"onnx: (onnxruntime does not run|the file does not answer)"
-        ),
-    ):
+    message = "onnx: (onnxruntime does not run|the file does not answer)"
+    with pytest.raises(CheckError, match=message):
         export(folder, tmp_path / "out", targets=("onnx",))
     assert not list((tmp_path / "out").glob("*"))
 

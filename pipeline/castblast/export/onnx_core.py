@@ -1,18 +1,15 @@
 """The core of a model of any shape, given as an ONNX model, inside the graph of the rest.
 
-All of it must be float64: a float32 constant inside costs half the digits of every answer. Where
-onnxruntime has an operator in float32 only, the same function is put together from others.
+All of it must be float64: a float32 constant inside costs half the digits of every answer.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from fractions import Fraction
+from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
-
 from castblast.errors import SpecError
+from castblast.export.onnx_forms import add_node
 from castblast.export.onnx_graph import Graph
 from castblast.network import Shell
 
@@ -39,13 +36,10 @@ def add_core(graph: Graph, x: str, core: bytes, shell: Shell) -> tuple[str, int]
         raise SpecError("\n".join(f"ONNX core: {fault}" for fault in faults))
     graph.constants.extend(model.graph.initializer)
     graph.add("Identity", _inputs(model)[0].name, x)
+    numbers = _numbers(model)
     for node in model.graph.node:
         node.doc_string = ""
-        form = _FORMS.get(node.op_type)
-        if form is None:
-            graph.nodes.append(node)
-        else:
-            form(_Form(graph, node))
+        add_node(graph, node, numbers)
     return model.graph.output[0].name, model.opset_import[0].version
 
 
@@ -84,80 +78,14 @@ def _inputs(model: Any) -> list[Any]:
     return [entry for entry in model.graph.input if entry.name not in names]
 
 
-class _Form:
-    """A node in the making as several others, the last of which has its name."""
+def _numbers(model: Any) -> dict[str, float]:
+    """Constants of a model that are single numbers, by name."""
+    from onnx import numpy_helper
 
-    def __init__(self, graph: Graph, node: Any) -> None:
-        self.graph, self.name, self.count = graph, node.output[0], 0
-        self.x, *self.others = node.input
-        self.attributes = {entry.name: entry.f for entry in node.attribute}
-
-    def number(self, value: float) -> str:
-        self.count += 1
-        return self.graph.constant(f"{self.name}_number_{self.count}", np.array(value))
-
-    def attribute(self, name: str, default: float) -> str:
-        """A number of the node. ONNX rounds it to float32: the plain one that was meant."""
-        if name not in self.attributes:
-            return self.number(default)
-        single = np.float32(self.attributes[name])
-        plain = float(Fraction(float(single)).limit_denominator(1000))
-        return self.number(plain if np.float32(plain) == single else float(str(single)))
-
-    def do(self, operator: str, *operands: str) -> str:
-        self.count += 1
-        return self.graph.add(operator, f"{self.name}_step_{self.count}", *operands)
-
-    def end(self, operator: str, *operands: str) -> None:
-        self.graph.add(operator, self.name, *operands)
-
-    def halves(self) -> tuple[str, str]:
-        """The positive and the negative part of what enters."""
-        return self.do("Relu", self.x), self.do("Min", self.x, self.number(0.0))
-
-
-def _elu(form: _Form) -> None:
-    form.end("Identity", _exponential(form, form.attribute("alpha", 1.0)))
-
-
-def _selu(form: _Form) -> None:
-    """Scaled ELU with the constants of Klambauer et al. (2017), in full."""
-    elu = _exponential(form, form.number(1.6732632423543772))
-    form.end("Mul", elu, form.number(1.0507009873554805))
-
-
-def _exponential(form: _Form, alpha: str) -> str:
-    """max(x, 0) + alpha (exp(min(x, 0)) - 1)."""
-    above, below = form.halves()
-    step = form.do("Sub", form.do("Exp", below), form.number(1.0))
-    return form.do("Add", above, form.do("Mul", alpha, step))
-
-
-def _leaky(form: _Form) -> None:
-    above, below = form.halves()
-    slope = form.others[0] if form.others else form.attribute("alpha", 0.01)
-    form.end("Add", above, form.do("Mul", slope, below))
-
-
-def _softplus(form: _Form) -> None:
-    """max(x, 0) + log(1 + exp(-|x|)), which never overflows."""
-    small = form.do("Exp", form.do("Neg", form.do("Abs", form.x)))
-    logarithm = form.do("Log", form.do("Add", small, form.number(1.0)))
-    form.end("Add", form.do("Relu", form.x), logarithm)
-
-
-def _hard_sigmoid(form: _Form) -> None:
-    line = form.do("Mul", form.x, form.attribute("alpha", 0.2))
-    line = form.do("Add", line, form.attribute("beta", 0.5))
-    form.end("Min", form.do("Relu", line), form.number(1.0))
-
-
-#: Operators that onnxruntime has in float32 only.
-_FORMS: dict[str, Callable[[_Form], None]] = {
-    "Elu": _elu,
-    "Selu": _selu,
-    "LeakyRelu": _leaky,
-    "PRelu": _leaky,
-    "Softplus": _softplus,
-    "HardSigmoid": _hard_sigmoid,
-}
+    tensors = {tensor.name: tensor for tensor in model.graph.initializer}
+    for node in model.graph.node:
+        for entry in node.attribute:
+            if node.op_type == "Constant" and entry.HasField("t"):
+                tensors[node.output[0]] = entry.t
+    arrays = {name: numpy_helper.to_array(tensor) for name, tensor in tensors.items()}
+    return {name: float(array) for name, array in arrays.items() if array.ndim == 0}

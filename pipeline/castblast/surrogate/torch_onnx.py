@@ -65,6 +65,8 @@ def _exported(module: torch.nn.Module, example: torch.Tensor, opset: int) -> byt
     with warnings.catch_warnings():
         # The newer exporter needs a further package and writes no operator set this old.
         warnings.simplefilter("ignore", DeprecationWarning)
+        # Told of every attention, right or wrong; the golden rows, other ones and more, decide.
+        warnings.simplefilter("ignore", torch.jit.TracerWarning)
         torch.onnx.export(
             module,
             (example,),
@@ -82,13 +84,11 @@ def _exported(module: torch.nn.Module, example: torch.Tensor, opset: int) -> byt
 @contextmanager
 def _double() -> Iterator[None]:
     """Constants that the exporter makes are float64, and its graph is not printed on a fault."""
-    kind = torch.get_default_dtype()
-    is_printed = getattr(torch._C, "_jit_is_onnx_log_enabled", lambda: False)()
-    print_graphs = getattr(torch._C, "_jit_set_onnx_log_enabled", lambda wanted: None)
+    kind, printer = torch.get_default_dtype(), getattr(torch._C, "_jit_onnx_log", None)
     torch.set_default_dtype(torch.float64)
-    print_graphs(False)
+    setattr(torch._C, "_jit_onnx_log", lambda *_: None)  # noqa: B010  (unknown to type checkers)
     try:
         yield
     finally:
-        print_graphs(is_printed)
+        setattr(torch._C, "_jit_onnx_log", printer)  # noqa: B010
         torch.set_default_dtype(kind)
