@@ -66,7 +66,7 @@ def _exported(module: torch.nn.Module, example: torch.Tensor, opset: int) -> byt
         # The newer exporter needs a further package and writes no operator set this old.
         warnings.simplefilter("ignore", DeprecationWarning)
         # Told of every attention, right or wrong; the golden rows, other ones and more, decide.
-        warnings.simplefilter("ignore", torch.jit.TracerWarning)
+        warnings.simplefilter("ignore", torch.jit.TracerWarning)  # type: ignore[attr-defined]
         torch.onnx.export(
             module,
             (example,),
