@@ -12,12 +12,16 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from castblast.export.answers import Answers, NotVerifiedError
+from castblast.export.onnx_file import run_onnx_rows
 from castblast.export.plain import Files
 from castblast.export.targets import TARGETS
 from castblast.network import (
+    Floats,
     Network,
+    Shell,
     density_score,
     explosive_index,
     in_domain,
@@ -138,33 +142,49 @@ def check_parity(network: Network, target: str, files: Files) -> ParityReport:
     CheckError
         A file does not compile or run at all.
     """
-    golden = network.golden
-    index = np.array([explosive_index(network, name) for name in golden.explosives], dtype=np.int64)
     try:
-        found, tool = TARGETS[target].run(network, files, golden.inputs, index)
+        found, tool = TARGETS[target].run(network, files, *_golden_rows(network))
     except NotVerifiedError as reason:
         return ParityReport(target, 0, {}, {}, remark=f"not verified: {reason}")
     return replace(compare_outputs(network, target, found), tool=tool)
 
 
-def compare_outputs(network: Network, target: str, found: Answers) -> ParityReport:
+def check_wrapped_parity(shell: Shell, model: bytes) -> ParityReport:
+    """Run an ONNX file of a model of any shape on the golden rows of its shell.
+
+    Raises
+    ------
+    CheckError
+        The file does not run.
+    """
+    found = run_onnx_rows(model, *_golden_rows(shell))
+    return replace(compare_outputs(shell, "onnx", found), tool="ONNX")
+
+
+def _golden_rows(shell: Shell) -> tuple[Floats, NDArray[np.int64]]:
+    golden = shell.golden
+    index = [explosive_index(shell, name) for name in golden.explosives]
+    return golden.inputs, np.array(index, dtype=np.int64)
+
+
+def compare_outputs(shell: Shell, target: str, found: Answers) -> ParityReport:
     """Hold the answers for the golden rows against the stored ones and their band and domain."""
-    truth, names = network.golden.outputs, network.output_names
+    truth, names = shell.golden.outputs, shell.output_names
     deviation = np.abs(found.values - truth)
     size = np.maximum(np.abs(truth), np.std(truth, axis=0))
-    half = np.abs(truth) * np.array([column.relative_band for column in network.outputs])
+    half = np.abs(truth) * np.array([column.relative_band for column in shell.outputs])
     band = np.maximum(np.abs(found.lower - (truth - half)), np.abs(found.upper - (truth + half)))
-    score = density_score(network, network.golden.inputs)
+    score = density_score(shell, shell.golden.inputs)
     drift = np.abs(found.score - score) / np.maximum(score, 1.0)
-    inside = in_domain(network, network.golden.inputs)
-    offending = offending_inputs(network, network.golden.inputs)
+    inside = in_domain(shell, shell.golden.inputs)
+    offending = offending_inputs(shell, shell.golden.inputs)
     return ParityReport(
         target,
         len(truth),
         dict(zip(names, deviation.max(axis=0).tolist(), strict=True)),
         dict(zip(names, (deviation / size).max(axis=0).tolist(), strict=True)),
         band=float((band / size).max()),
-        score=0.0 if network.density is None else float(drift.max()),
+        score=0.0 if shell.density is None else float(drift.max()),
         flags=int(np.count_nonzero(found.inside != inside)),
         names=int(np.count_nonzero(np.any(found.offending != offending, axis=1))),
     )

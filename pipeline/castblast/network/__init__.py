@@ -37,6 +37,7 @@ from castblast.network.record import (
     Layer,
     Network,
     OutputColumn,
+    Shell,
 )
 from castblast.network.terms import SCHEMA_VERSION, Activation, Floats, Transform
 
@@ -57,6 +58,7 @@ __all__ = [
     "Network",
     "OutputColumn",
     "RowPredictions",
+    "Shell",
     "Transform",
     "density_reliefs",
     "density_score",

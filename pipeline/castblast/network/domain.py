@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.network.record import Column, Network
+from castblast.network.record import Column, Shell
 from castblast.network.terms import Floats
 
 #: What refuses a row: range of one input, rule between inputs, joint density; or an input that the
@@ -38,7 +38,7 @@ def scale_columns(values: Floats, columns: tuple[Column, ...]) -> Floats:
     return scaled
 
 
-def density_score(network: Network, numeric: Floats) -> Floats:
+def density_score(shell: Shell, numeric: Floats) -> Floats:
     """Score rows of SI inputs (n, k) against the joint density of the training rows.
 
     Returns
@@ -47,22 +47,22 @@ def density_score(network: Network, numeric: Floats) -> Floats:
         At most 1 inside; NaN where an input cannot be scaled, and everywhere if the network has
         no density.
     """
-    if network.density is None:
+    if shell.density is None:
         return np.full(len(numeric), np.nan)
-    distances = network.density.distances(scale_columns(numeric, network.inputs))
-    return np.asarray(np.min(distances, axis=0) / network.density.threshold)
+    distances = shell.density.distances(scale_columns(numeric, shell.inputs))
+    return np.asarray(np.min(distances, axis=0) / shell.density.threshold)
 
 
-def density_reliefs(network: Network, numeric: Floats) -> Floats:
+def density_reliefs(shell: Shell, numeric: Floats) -> Floats:
     """How far the score of each row would fall if one input were free, (n, k).
 
     About the nearest centre c with P = whitening' whitening and d = z - c, letting input i go to
     its best value given the others lowers the squared distance by (P d)_i² / P_ii.
     """
-    density = network.density
+    density = shell.density
     if density is None:
-        return np.zeros((len(numeric), len(network.inputs)))
-    scaled = scale_columns(numeric, network.inputs)
+        return np.zeros((len(numeric), len(shell.inputs)))
+    scaled = scale_columns(numeric, shell.inputs)
     nearest = np.argmin(np.nan_to_num(density.distances(scaled), nan=np.inf), axis=0)
     whitening = density.whitening[nearest]
     steps = np.einsum("nij,nj->ni", whitening, scaled - density.centres[nearest])
@@ -70,40 +70,40 @@ def density_reliefs(network: Network, numeric: Floats) -> Floats:
     return np.asarray(slopes**2 / np.sum(whitening**2, axis=1) / density.threshold)
 
 
-def in_domain(network: Network, numeric: Floats) -> NDArray[np.bool_]:
+def in_domain(shell: Shell, numeric: Floats) -> NDArray[np.bool_]:
     """Tell for each row of SI inputs (n, k) whether it lies in the domain; NaN does not."""
-    lower = np.array([column.lower for column in network.inputs])
-    upper = np.array([column.upper for column in network.inputs])
+    lower = np.array([column.lower for column in shell.inputs])
+    upper = np.array([column.upper for column in shell.inputs])
     inside: NDArray[np.bool_] = np.all((numeric >= lower) & (numeric <= upper), axis=1)
-    row = dict(zip(network.input_names, numeric.T, strict=True))
-    for rule in network.constraints:
+    row = dict(zip(shell.input_names, numeric.T, strict=True))
+    for rule in shell.constraints:
         with np.errstate(invalid="ignore"):
             inside &= rule.margin(row) >= 0.0
-    if network.density is not None:
-        inside &= density_score(network, numeric) <= 1.0
+    if shell.density is not None:
+        inside &= density_score(shell, numeric) <= 1.0
     return inside
 
 
-def offending_inputs(network: Network, numeric: Floats) -> NDArray[np.bool_]:
+def offending_inputs(shell: Shell, numeric: Floats) -> NDArray[np.bool_]:
     """Inputs that `domain_violations` names, for rows of SI inputs (n, k): (n, k) bool."""
-    lower = np.array([column.lower for column in network.inputs])
-    upper = np.array([column.upper for column in network.inputs])
+    lower = np.array([column.lower for column in shell.inputs])
+    upper = np.array([column.upper for column in shell.inputs])
     named: NDArray[np.bool_] = ~((numeric >= lower) & (numeric <= upper))
-    columns = dict(zip(network.input_names, numeric.T, strict=True))
-    for rule in network.constraints:
+    columns = dict(zip(shell.input_names, numeric.T, strict=True))
+    for rule in shell.constraints:
         with np.errstate(invalid="ignore"):
             broken = ~(rule.margin(columns) >= 0.0)
-        involved = np.array([name in rule.coefficients for name in network.input_names])
+        involved = np.array([name in rule.coefficients for name in shell.input_names])
         named |= broken[:, None] & involved
-    if network.density is not None:
-        unusual = ~named.any(axis=1) & ~(density_score(network, numeric) <= 1.0)
-        reliefs = density_reliefs(network, numeric[unusual])
+    if shell.density is not None:
+        unusual = ~named.any(axis=1) & ~(density_score(shell, numeric) <= 1.0)
+        reliefs = density_reliefs(shell, numeric[unusual])
         most = np.max(reliefs, axis=1, keepdims=True, initial=0.0)
         named[unusual] = ~(reliefs < BLAME * most)
     return named
 
 
-def domain_violations(network: Network, row: Mapping[str, float]) -> list[DomainViolation]:
+def domain_violations(shell: Shell, row: Mapping[str, float]) -> list[DomainViolation]:
     """Give every reason why one row of SI inputs lies outside the training domain.
 
     Returns
@@ -113,44 +113,44 @@ def domain_violations(network: Network, row: Mapping[str, float]) -> list[Domain
         The joint density is told only where ranges and rules say nothing.
     """
     violations = []
-    for column in network.inputs:
+    for column in shell.inputs:
         value = float(row[column.name])
         if not column.lower <= value <= column.upper:
             trained = f"{column.show(column.lower)} to {column.show(column.upper)}"
             message = f"{column.name} = {column.show(value)}: trained on {trained}"
             violations.append(DomainViolation((column.name,), message, "box"))
-    shown = {column.name: column.show(float(row[column.name])) for column in network.inputs}
-    for rule in network.constraints:
+    shown = {column.name: column.show(float(row[column.name])) for column in shell.inputs}
+    for rule in shell.constraints:
         # Written so that NaN breaks the rule, as in `in_domain`.
         if not rule.margin(row) >= 0.0:
             values = ", ".join(f"{name} = {shown[name]}" for name in rule.coefficients)
             message = f"{values}: trained on {rule.label}"
             violations.append(DomainViolation(tuple(rule.coefficients), message, "rule"))
-    return violations or _density_violation(network, row, shown)
+    return violations or _density_violation(shell, row, shown)
 
 
 def _density_violation(
-    network: Network, row: Mapping[str, float], shown: Mapping[str, str]
+    shell: Shell, row: Mapping[str, float], shown: Mapping[str, str]
 ) -> list[DomainViolation]:
     """Tell of a row whose single values are usual, but not together."""
-    numeric = np.array([[float(row[name]) for name in network.input_names]])
-    score = float(density_score(network, numeric)[0])
-    if network.density is None or score <= 1.0:
+    numeric = np.array([[float(row[name]) for name in shell.input_names]])
+    score = float(density_score(shell, numeric)[0])
+    if shell.density is None or score <= 1.0:
         return []
-    reliefs = density_reliefs(network, numeric)[0]
+    reliefs = density_reliefs(shell, numeric)[0]
     named = tuple(
         name
-        for name, relief in zip(network.input_names, reliefs, strict=True)
+        for name, relief in zip(shell.input_names, reliefs, strict=True)
         if not relief < BLAME * np.max(reliefs)
     )
     values = ", ".join(f"{name} = {shown[name]}" for name in named)
     message = (
         f"{values}: unusual {'together' if len(named) > 1 else 'beside the other inputs'}, "
-        f"score {score:.3g} where {network.density.level:.1%} of the training designs stay below 1"
+        f"score {score:.3g} where {shell.density.level:.1%} of the training designs stay below 1"
     )
     return [DomainViolation(named, message, "density")]
 
 
-def domain_faults(network: Network, row: Mapping[str, float]) -> list[str]:
+def domain_faults(shell: Shell, row: Mapping[str, float]) -> list[str]:
     """Messages of `domain_violations`."""
-    return [violation.message for violation in domain_violations(network, row)]
+    return [violation.message for violation in domain_violations(shell, row)]

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from castblast.errors import SpecError, nearest_name
 from castblast.network.domain import density_score, in_domain, scale_columns
-from castblast.network.record import Layer, Network
+from castblast.network.record import Layer, Network, Shell
 from castblast.network.terms import Floats
 
 
@@ -50,7 +50,7 @@ class RowPredictions(NamedTuple):
     inside: NDArray[np.bool_]
 
 
-def explosive_index(network: Network, name: str) -> int:
+def explosive_index(shell: Shell, name: str) -> int:
     """Position of an explosive in the codes.
 
     Raises
@@ -58,30 +58,30 @@ def explosive_index(network: Network, name: str) -> int:
     SpecError
         The network was not trained on it; the message lists those it knows.
     """
-    if name not in network.explosives:
-        hint = nearest_name(name, network.explosives)
-        known = ", ".join(network.explosives)
+    if name not in shell.explosives:
+        hint = nearest_name(name, shell.explosives)
+        known = ", ".join(shell.explosives)
         message = f"explosive '{name}': this network does not know it{hint} (it knows {known})"
         raise SpecError(message)
-    return network.explosives.index(name)
+    return shell.explosives.index(name)
 
 
-def scaled_inputs(network: Network, numeric: Floats, index: NDArray[np.int64]) -> Floats:
+def scaled_inputs(shell: Shell, numeric: Floats, index: NDArray[np.int64]) -> Floats:
     """What enters the first layer: scaled inputs, scaled derived columns, codes; (n, k + d + c)."""
-    parts = [scale_columns(numeric, network.inputs)]
-    if network.derived:
+    parts = [scale_columns(numeric, shell.inputs)]
+    if shell.derived:
         with np.errstate(invalid="ignore"):
-            combined = numeric @ derived_matrix(network)
-        parts.append(scale_columns(combined, network.derived))
-    return np.concatenate([*parts, network.codes[index]], axis=1)
+            combined = numeric @ derived_matrix(shell)
+        parts.append(scale_columns(combined, shell.derived))
+    return np.concatenate([*parts, shell.codes[index]], axis=1)
 
 
-def derived_matrix(network: Network) -> Floats:
+def derived_matrix(shell: Shell) -> Floats:
     """Coefficients (k, d): numeric inputs @ matrix = derived columns, both SI."""
     return np.array(
         [
-            [column.coefficients.get(name, 0.0) for column in network.derived]
-            for name in network.input_names
+            [column.coefficients.get(name, 0.0) for column in shell.derived]
+            for name in shell.input_names
         ],
         dtype=np.float64,
     )

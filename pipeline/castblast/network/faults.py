@@ -10,7 +10,7 @@ import numpy as np
 from castblast.network.terms import SCHEMA_VERSION, Activation, Transform
 
 if TYPE_CHECKING:
-    from castblast.network.record import Column, DensityScore, Layer, Network
+    from castblast.network.record import Column, DensityScore, Layer, Network, Shell
 
 
 def network_faults(network: Network) -> list[str]:
@@ -18,27 +18,39 @@ def network_faults(network: Network) -> list[str]:
     faults = []
     if network.schema_version != SCHEMA_VERSION:
         faults.append(f"schema version {network.schema_version}, this one reads {SCHEMA_VERSION}")
-    if not (network.inputs and network.outputs and network.layers and network.explosives):
-        faults.append("needs at least one input, output, layer and explosive")
-    columns: tuple[Column, ...] = network.inputs + network.derived + network.outputs
+    if not network.layers:
+        faults.append("needs at least one layer")
+    return faults + shell_faults(network) + _layer_faults(network)
+
+
+def shell_faults(shell: Shell) -> list[str]:
+    """Say what is wrong around the layers of a surrogate, one line each."""
+    faults = []
+    if not (shell.inputs and shell.outputs and shell.explosives):
+        faults.append("needs at least one input, output and explosive")
+    columns: tuple[Column, ...] = shell.inputs + shell.derived + shell.outputs
     names = [column.name for column in columns]
-    if len(set(names)) != len(names) or len(set(network.explosives)) != len(network.explosives):
+    if len(set(names)) != len(names) or len(set(shell.explosives)) != len(shell.explosives):
         faults.append("a name appears twice")
     faults += _column_faults(columns)
-    for entry in network.inputs:
+    for entry in shell.inputs:
         least = 0.0 if entry.transform == "log" else -np.inf
         if not least < entry.lower <= entry.upper < np.inf:
             faults.append(f"{entry.name}: domain {entry.lower!r} to {entry.upper!r} is no range")
     faults += [
         f"{column.name}: the error band must be finite and not negative"
-        for column in network.outputs
+        for column in shell.outputs
         if not 0.0 <= column.relative_band < np.inf
     ]
-    for rule in network.constraints:
-        faults += _unknown_inputs(f"rule '{rule.label}'", rule.coefficients, network)
-    for column in network.derived:
-        faults += _unknown_inputs(column.name, column.coefficients, network)
-    return faults + _shape_faults(network) + _golden_faults(network)
+    for rule in shell.constraints:
+        faults += _unknown_inputs(f"rule '{rule.label}'", rule.coefficients, shell)
+    for column in shell.derived:
+        faults += _unknown_inputs(column.name, column.coefficients, shell)
+    if not _has_codes(shell):
+        faults.append("one row of codes per explosive is needed")
+    if shell.density is not None:
+        faults += _density_faults(shell.density, len(shell.inputs))
+    return faults + _golden_faults(shell)
 
 
 def _column_faults(columns: Iterable[Column]) -> list[str]:
@@ -51,21 +63,22 @@ def _column_faults(columns: Iterable[Column]) -> list[str]:
     return faults
 
 
-def _unknown_inputs(what: str, coefficients: Mapping[str, float], network: Network) -> list[str]:
-    known = network.input_names
+def _unknown_inputs(what: str, coefficients: Mapping[str, float], shell: Shell) -> list[str]:
+    known = shell.input_names
     return [f"{what}: no input '{name}'" for name in coefficients if name not in known]
 
 
-def _shape_faults(network: Network) -> list[str]:
-    if network.codes.ndim != 2 or len(network.codes) != len(network.explosives):
-        return ["one row of codes per explosive is needed"]
-    width = len(network.inputs) + len(network.derived) + network.codes.shape[1]
-    faults = _chain_faults(network.layers, width, len(network.outputs))
+def _has_codes(shell: Shell) -> bool:
+    return shell.codes.ndim == 2 and len(shell.codes) == len(shell.explosives)
+
+
+def _layer_faults(network: Network) -> list[str]:
+    if not _has_codes(network):
+        return []
+    width, outputs = network.width, len(network.outputs)
+    faults = _chain_faults(network.layers, width, outputs)
     for number, member in enumerate(network.members, 1):
-        lines = _chain_faults(member, width, len(network.outputs))
-        faults += [f"member {number}: {line}" for line in lines]
-    if network.density is not None:
-        faults += _density_faults(network.density, len(network.inputs))
+        faults += [f"member {number}: {line}" for line in _chain_faults(member, width, outputs)]
     return faults
 
 
@@ -101,12 +114,12 @@ def _density_faults(density: DensityScore, inputs: int) -> list[str]:
     return []
 
 
-def _golden_faults(network: Network) -> list[str]:
-    rows, golden, faults = len(network.golden.explosives), network.golden, []
-    if golden.inputs.shape != (rows, len(network.inputs)) or (
-        golden.outputs.shape != (rows, len(network.outputs))
+def _golden_faults(shell: Shell) -> list[str]:
+    rows, golden, faults = len(shell.golden.explosives), shell.golden, []
+    if golden.inputs.shape != (rows, len(shell.inputs)) or (
+        golden.outputs.shape != (rows, len(shell.outputs))
     ):
         faults.append("golden rows do not have the shape of the inputs and outputs")
-    if not set(golden.explosives) <= set(network.explosives):
+    if not set(golden.explosives) <= set(shell.explosives):
         faults.append("golden rows name an unknown explosive")
     return faults

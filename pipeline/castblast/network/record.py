@@ -14,13 +14,13 @@ if its column says so, exponentiated.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
 
 from castblast.errors import SpecError
-from castblast.network.faults import network_faults
+from castblast.network.faults import network_faults, shell_faults
 from castblast.network.terms import SCHEMA_VERSION, Activation, Floats, Transform
 from castblast.variables import VARIABLES
 
@@ -159,52 +159,49 @@ class GoldenRows:
     outputs: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class Network:
-    """Scaled feed-forward surrogate with its units, domain, error band and provenance.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Shell:
+    """Everything about a surrogate but the map from scaled columns to scaled outputs.
+
+    A `Network` is a shell with dense layers inside. A model of another shape has a shell too; what
+    stands inside it is then for others to keep, and nothing here can evaluate it.
 
     Attributes
     ----------
     inputs : tuple of InputColumn, k of them
     explosives : tuple of str
-        Names the network knows, in the order of `codes`.
+        Names the surrogate knows, in the order of `codes`.
     codes : (len(explosives), c)
-        What enters the first layer for each explosive; the identity matrix is one-hot.
-    layers : tuple of Layer
-        The first takes k + d + c values, the last gives one per output.
+        What enters the model for each explosive; the identity matrix is one-hot.
     outputs : tuple of OutputColumn
     constraints : tuple of Constraint
         Rules of the domain beside the box of the inputs.
     golden : GoldenRows
     provenance : mapping
         Dataset, recipe, spec, scores and version; plain JSON values.
-    schema_version : int
     derived : tuple of DerivedColumn, d of them
-        Enter the first layer between the numeric inputs and the code.
+        Enter the model between the numeric inputs and the code.
     density : DensityScore, optional
         Joint domain of the training rows.
-    members : tuple of chains of Layer
-        Other fits of the same spec with the scalings of this one; they give the spread of an
-        ensemble, never the value.
     """
 
     inputs: tuple[InputColumn, ...]
     explosives: tuple[str, ...]
     codes: Floats
-    layers: tuple[Layer, ...]
     outputs: tuple[OutputColumn, ...]
     constraints: tuple[Constraint, ...]
     golden: GoldenRows
     provenance: Mapping[str, Any] = field(default_factory=dict)
-    schema_version: int = SCHEMA_VERSION
     derived: tuple[DerivedColumn, ...] = ()
     density: DensityScore | None = None
-    members: tuple[tuple[Layer, ...], ...] = ()
 
     def __post_init__(self) -> None:
-        faults = network_faults(self)
+        faults = self._faults()
         if faults:
             raise SpecError("\n".join(f"network: {fault}" for fault in faults))
+
+    def _faults(self) -> list[str]:
+        return shell_faults(self)
 
     @property
     def input_names(self) -> tuple[str, ...]:
@@ -215,6 +212,39 @@ class Network:
     def output_names(self) -> tuple[str, ...]:
         """Names of the outputs, in order."""
         return tuple(column.name for column in self.outputs)
+
+    @property
+    def width(self) -> int:
+        """Number of values that enter the model: k + d + c."""
+        return len(self.inputs) + len(self.derived) + int(self.codes.shape[1])
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Network(Shell):
+    """Scaled feed-forward surrogate with its units, domain, error band and provenance.
+
+    Attributes
+    ----------
+    layers : tuple of Layer
+        The first takes k + d + c values, the last gives one per output.
+    schema_version : int
+    members : tuple of chains of Layer
+        Other fits of the same spec with the scalings of this one; they give the spread of an
+        ensemble, never the value.
+    """
+
+    layers: tuple[Layer, ...]
+    schema_version: int = SCHEMA_VERSION
+    members: tuple[tuple[Layer, ...], ...] = ()
+
+    @classmethod
+    def of(cls, shell: Shell, layers: tuple[Layer, ...]) -> Network:
+        """Put layers into a shell."""
+        around = {entry.name: getattr(shell, entry.name) for entry in fields(Shell)}
+        return cls(**around, layers=layers)
+
+    def _faults(self) -> list[str]:
+        return network_faults(self)
 
     @property
     def parameter_count(self) -> int:

@@ -1,4 +1,8 @@
-"""Write a network for other tools and prove that each file gives the same numbers."""
+"""Write a network for other tools and prove that each file gives the same numbers.
+
+A torch module that is no chain of dense layers has no network.json; it goes to ONNX only, from the
+fit that is kept beside where that would be.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +19,7 @@ from castblast.export.json_file import read_network
 from castblast.files import write_text, write_with
 from castblast.network import Network
 from castblast.progress import ProgressCallback, silent
+from castblast.stages.fitting import FIT_STORE
 
 if TYPE_CHECKING:
     from castblast.export.parity import ParityReport
@@ -49,6 +54,8 @@ def export(
     ----------
     fit : path
         Folder of `castblast compare` (its chosen fit is taken), of one fit, or a network.json.
+        A folder without a network.json but with a fit is opened only if it is your own: like any
+        pickle, a kept fit can run code.
     out : path, optional
         Folder for the files; default ``export`` beside the fit.
     targets : sequence of str
@@ -69,12 +76,15 @@ def export(
         A file that does not give the answers of the fitted estimator.
     """
     wanted = _targets(targets)
-    source = find_network(fit)
-    network = read_network(source)
+    source = _find_source(fit)
     folder = source.parent / "export" if out is None else out
     _require_writable(folder)
-    contents = _write(network, wanted, source, histories)
-    reports = _verify(network, contents, progress) if verify else {}
+    if source.name == FIT_STORE:
+        contents, reports = _export_module(source, wanted, verify, progress)
+    else:
+        network = read_network(source)
+        contents = _write(network, wanted, source, histories)
+        reports = _verify(network, contents, progress) if verify else {}
     files, lines = [], []
     for name, content in {k: v for part in contents.values() for k, v in part.items()}.items():
         files.append(write_with(folder / name, partial(_write_bytes, content=content)))
@@ -156,6 +166,63 @@ def find_network(fit: Path) -> Path:
         what = "holds no network.json; give a folder of castblast compare"
     message = f"{fit}: {what}"
     raise SpecError(message)
+
+
+def _find_source(fit: Path) -> Path:
+    """As `find_network`; the kept fit of a folder that has no network."""
+    kept = fit / FIT_STORE
+    has_network = any((fit / name).is_file() for name in ("comparison.json", "network.json"))
+    return kept if kept.is_file() and not has_network else find_network(fit)
+
+
+def _export_module(
+    source: Path, wanted: Sequence[str], verify: bool, progress: ProgressCallback
+) -> tuple[dict[str, dict[str, bytes]], dict[str, ParityReport]]:
+    """Files and reports of a fit that is no chain of dense layers."""
+    from castblast.export.onnx_file import wrap_onnx
+    from castblast.export.parity import check_wrapped_parity
+    from castblast.surrogate.estimators import bare_model, is_torch_model
+    from castblast.surrogate.fit_store import open_fit
+
+    fit = open_fit(source)
+    name, model = fit.spec.name, bare_model(fit.estimator)
+    if fit.network is not None:
+        message = f"{source.parent}: its network.json is gone; remove {FIT_STORE} and train again"
+        raise SpecError(message)
+    if not is_torch_model(model):
+        message = (
+            f"{name} ({type(model).__name__}): neither a chain of dense layers nor a torch module, "
+            "no target can carry it"
+        )
+        raise SpecError(message)
+    others = [target for target in wanted if target != "onnx"]
+    if others:
+        message = (
+            f"{name}: this torch module is no chain of dense layers, only onnx can carry it, "
+            f"not {', '.join(others)} (--to onnx)"
+        )
+        raise SpecError(message)
+    from castblast.surrogate.torch_onnx import torch_core
+
+    progress(0.0, f"tracing {name}")
+    shell = fit.shell()
+    try:
+        content = wrap_onnx(shell, torch_core(fit))
+    except SpecError as fault:
+        lines = [line.removeprefix(f"{name}: ") for line in str(fault).splitlines()]
+        raise SpecError("\n".join(f"{name}: {line}" for line in lines)) from fault
+    contents = {"onnx": {"model.onnx": content}}
+    if not verify:
+        return contents, {}
+    progress(0.5, "running onnx")
+    try:
+        report = check_wrapped_parity(shell, content)
+    except CheckError as fault:
+        message = f"onnx: {fault}"
+        raise CheckError(message) from fault
+    if report.faults:
+        raise CheckError("\n".join(f"onnx: {line}" for line in report.faults))
+    return contents, {"onnx": report}
 
 
 def _targets(targets: Sequence[str]) -> list[str]:

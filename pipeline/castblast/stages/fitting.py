@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from castblast.surrogate.features import Table
     from castblast.surrogate.training import Fit
 
-_STORE = "fit.pickle"
+#: A finished fit as it is kept for this machine.
+FIT_STORE = "fit.pickle"
 _DATASET = "dataset.txt"
 
 
@@ -70,7 +71,7 @@ def fit_all(
     from castblast.surrogate.fit_store import fit_key, load_fit
 
     keys = [fit_key(spec, table) for spec in specs]
-    places = [folder / spec.name / _STORE for spec in specs]
+    places = [folder / spec.name / FIT_STORE for spec in specs]
     fits = [load_fit(place, key) for place, key in zip(places, keys, strict=True)]
     missing = [number for number, fit in enumerate(fits) if fit is None]
     if min(len(missing), workers or available_cores()) <= 1:
@@ -116,7 +117,7 @@ def kept_fits(folder: Path) -> tuple[Path, list[ModelSpec]]:
     from castblast.surrogate.fit_store import kept_spec
 
     note = folder / _DATASET
-    specs = [kept_spec(place) for place in sorted(folder.glob(f"*/{_STORE}"))]
+    specs = [kept_spec(place) for place in sorted(folder.glob(f"*/{FIT_STORE}"))]
     found = [spec for spec in specs if spec is not None]
     if not note.is_file() or not found:
         message = f"{folder}: holds no fits of castblast train; give the dataset instead"
@@ -163,7 +164,7 @@ def _write_files(folder: Path, fit: Fit) -> None:
 
 def fit_files(folder: Path) -> list[Path]:
     """Files of a fit that mean the same elsewhere."""
-    return sorted(path for path in folder.iterdir() if path.is_file() and path.name != _STORE)
+    return sorted(path for path in folder.iterdir() if path.is_file() and path.name != FIT_STORE)
 
 
 def write_json(path: Path, document: dict[str, Any]) -> Path:

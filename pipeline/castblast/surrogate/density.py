@@ -11,10 +11,11 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
-from castblast.network import DensityScore, Floats, Network, scale_columns
+from castblast.network import DensityScore, Floats, Shell, scale_columns
 from castblast.surrogate.features import Table
 
 #: Share of rows of the training distribution that are to count as inside.
@@ -25,13 +26,15 @@ _ROWS_PER_NUMBER = 5
 #: Least variance in any direction, in units of a scaled input.
 _LEAST_VARIANCE = 1e-6
 
+_AnyShell = TypeVar("_AnyShell", bound=Shell)
 
-def with_density(network: Network, table: Table) -> Network:
-    """Give the network with the joint density of the training rows of its table."""
-    numeric = table.frame[list(network.input_names)].to_numpy(dtype=np.float64)
-    scaled = scale_columns(numeric, network.inputs)
+
+def with_density(shell: _AnyShell, table: Table) -> _AnyShell:
+    """Give a network or shell with the joint density of the training rows of its table."""
+    numeric = table.frame[list(shell.input_names)].to_numpy(dtype=np.float64)
+    scaled = scale_columns(numeric, shell.inputs)
     held = scaled[table.rows("valid", "calibration")]
-    return replace(network, density=fit_density(scaled[table.rows("train")], held))
+    return replace(shell, density=fit_density(scaled[table.rows("train")], held))
 
 
 def fit_density(

@@ -23,6 +23,7 @@ from castblast.network import (
     Layer,
     Network,
     OutputColumn,
+    Shell,
 )
 from castblast.specs.model import MlpSpec, ModelSpec
 from castblast.surrogate.families import make_model
@@ -167,10 +168,39 @@ def predict(estimator: Any, frame: Any) -> Floats:
     return values.reshape(len(frame), -1)
 
 
+def bare_model(estimator: Any) -> Any:
+    """What a fitted estimator holds inside its scalings; a user's own model as they made it."""
+    model = estimator.regressor_["model"]
+    return getattr(model, "model_", model)
+
+
+def is_torch_model(model: Any) -> bool:
+    """Whether a bare model is one of `castblast.surrogate.torch_mlp`, without importing torch."""
+    return type(model).__module__ == "castblast.surrogate.torch_mlp"
+
+
 def to_network(
     estimator: Any, spec: ModelSpec, table: Table, band: Floats, provenance: Mapping[str, Any]
 ) -> Network | None:
-    """Turn a fitted estimator into the neutral record.
+    """Turn a fitted estimator into the neutral record; parameters as `to_shell`.
+
+    Returns
+    -------
+    Network or None
+        None for a model that is no chain of dense layers.
+    """
+    from castblast.surrogate.dense_models import layers_of
+
+    layers = layers_of(estimator.regressor_["model"])
+    if layers is None:
+        return None
+    return Network.of(to_shell(estimator, spec, table, band, provenance), layers)
+
+
+def to_shell(
+    estimator: Any, spec: ModelSpec, table: Table, band: Floats, provenance: Mapping[str, Any]
+) -> Shell:
+    """Everything of the neutral record but the layers, for a model of any shape.
 
     Parameters
     ----------
@@ -183,18 +213,9 @@ def to_network(
         Relative 95 % band of each target.
     provenance : mapping
         Plain JSON values.
-
-    Returns
-    -------
-    Network or None
-        None for a model that is no chain of dense layers.
     """
     from castblast.surrogate.columns import derived_columns, explosive_codes
-    from castblast.surrogate.dense_models import layers_of
 
-    layers = layers_of(estimator.regressor_["model"])
-    if layers is None:
-        return None
     columns = estimator.regressor_["columns"]
     numeric = columns.named_transformers_["numeric"]["scale"]
     transforms = [spec.transform_of(name) for name in spec.features]
@@ -212,11 +233,10 @@ def to_network(
         )
         for j, name in enumerate(table.target_names)
     )
-    return Network(
+    return Shell(
         inputs=inputs,
         explosives=table.explosives,
         codes=explosive_codes(columns, table.explosives),
-        layers=layers,
         outputs=outputs,
         constraints=domain_constraints(table),
         golden=golden_rows(estimator, inputs, table.explosives, derived),

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from castblast import __version__
+from castblast.errors import SpecError
 from castblast.files import write_with
 from castblast.specs.model import CustomSpec, ModelSpec
 from castblast.surrogate.custom import importable
@@ -29,7 +30,7 @@ from castblast.surrogate.training import Fit
 _OBSERVERS = (
     "comparison", "gate", "shifts", "strata", "learning", "sensitivity", "tuning", "tuning_space",
     "study_file", "timing", "tracking", "logged_model", "run_list", "infill", "probe",
-    "domain", "ensemble", "fit_store",
+    "domain", "ensemble", "fit_store", "torch_onnx",
 )  # fmt: skip
 _LIBRARIES = ("numpy", "scikit-learn", "torch")
 _PACKAGE = Path(__file__).resolve().parent.parent
@@ -53,12 +54,19 @@ def fit_key(spec: ModelSpec, table: Table) -> dict[str, str]:
     """Everything that a fit is made from: spec, rows, code and libraries."""
     own = table.select(spec.features, spec.targets)
     return {
-        "castblast": __version__,
         "spec": spec.sha256(),
         "name": spec.name,
         "description": spec.description,
         "dataset": table.source.get("content_sha256", ""),
         "rows": table_hash(own),
+        **_code_key(spec),
+    }
+
+
+def _code_key(spec: ModelSpec) -> dict[str, str]:
+    """The part of a key that is known without the rows: code and libraries."""
+    return {
+        "castblast": __version__,
         "code": _code_hash(),
         "factory": _factory_hash(spec),
         **{library: _version(library) for library in _LIBRARIES},
@@ -131,6 +139,40 @@ def load_fit(path: Path, key: Mapping[str, str]) -> Fit | None:
     """Give the fit that was made from exactly `key`, if it is there."""
     fit = load_kept(path, key)
     return fit if isinstance(fit, Fit) else None
+
+
+def open_fit(path: Path) -> Fit:
+    """Give a fit that is kept in a file, whatever rows it was fitted on.
+
+    Raises
+    ------
+    SpecError
+        The file is damaged, needs what is missing here, or was written by other code, with which
+        the fit may answer otherwise than when it was trained.
+    """
+    stored = _unpickle(path.read_bytes())
+    spec = stored.get("spec") if isinstance(stored, dict) else None
+    if spec is None:
+        message = f"{path}: holds no fit; run castblast train again"
+        raise SpecError(message)
+    now = _code_key(spec)
+    changed = [name for name, value in now.items() if stored["key"].get(name) != value]
+    if changed:
+        message = (
+            f"{path}: was fitted with other {', '.join(changed)} than there is now; "
+            "run castblast train again"
+        )
+        raise SpecError(message)
+    try:
+        with importable(str(getattr(spec, "folder", ""))):
+            fit = pickle.loads(stored["value"])
+    except Exception as fault:  # whatever a module of a user's own raises when it is imported
+        message = f"{path}: cannot be read: {fault}"
+        raise SpecError(message) from fault
+    if not isinstance(fit, Fit):
+        message = f"{path}: holds a {type(fit).__name__}, no fit"
+        raise SpecError(message)
+    return fit
 
 
 def kept_spec(path: Path) -> ModelSpec | None:

@@ -12,12 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from castblast.surrogate.estimators import predict
+from castblast.surrogate.estimators import bare_model, is_torch_model, predict
 from castblast.surrogate.training import Fit
 
 #: Classes whose state skops may restore: functions of our stock pipelines, and our own.
 _FUNCTIONS = ["numpy.log", "numpy.exp"]
-_TORCH = "castblast.surrogate.torch_mlp"
 _OWN = ("castblast.", "sklearn.", "numpy.")
 
 
@@ -38,9 +37,8 @@ def log_model(mlflow: Any, fit: Fit) -> tuple[str | None, str]:
         "sklearn", "pytorch" or "none".
     """
     rows = fit.table.frame.iloc[fit.table.rows("train")].head(2)
-    model = fit.estimator.regressor_["model"]
-    model = getattr(model, "model_", model)
-    if type(model).__module__ == _TORCH:
+    model = bare_model(fit.estimator)
+    if is_torch_model(model):
         return _log_module(mlflow, fit, model, rows), "pytorch"
     if not _is_known(fit.estimator):
         return None, "none"
@@ -79,8 +77,8 @@ def _parts(estimator: Any) -> list[Any]:
 
 def _is_known(estimator: Any) -> bool:
     """Whether every part of an estimator is scikit-learn's or ours."""
-    model = getattr(estimator.regressor_["model"], "model_", estimator.regressor_["model"])
-    return all(type(part).__module__.startswith(_OWN) for part in (*_parts(estimator), model))
+    parts = (*_parts(estimator), bare_model(estimator))
+    return all(type(part).__module__.startswith(_OWN) for part in parts)
 
 
 def _own_types(estimator: Any) -> list[str]:

@@ -1,4 +1,4 @@
-"""Networks in PyTorch: the only module that imports it.
+"""Networks in PyTorch: the only module that imports it, but for `torch_onnx`.
 
 Float64 on one thread with fixed seeds, so that the same rows give the same weights. Adam on
 mini-batches finds the region, L-BFGS with a strong Wolfe line search on all rows goes to the

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from castblast import __version__
-from castblast.network import Floats, Network
+from castblast.network import Floats, Network, Shell
 from castblast.progress import ProgressCallback, silent
 from castblast.specs.model import ModelSpec
 from castblast.surrogate import estimators
@@ -88,6 +88,12 @@ class Fit:
         return score_targets(
             self.table.targets[rows], self.predicted[rows], self.table.target_names
         )
+
+    def shell(self) -> Shell:
+        """Everything of the exportable record but the layers, for a model of any shape."""
+        provenance = _provenance(self.spec, self.table, self.predicted, self.band, self.restart)
+        shell = estimators.to_shell(self.estimator, self.spec, self.table, self.band, provenance)
+        return with_density(shell, self.table)
 
     def to_document(self) -> dict[str, Any]:
         """Give everything that is worth keeping of the fit as plain JSON values."""
