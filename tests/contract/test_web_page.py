@@ -17,6 +17,8 @@ from toy_network import toy_network
 from castblast.errors import SpecError
 from castblast.export.parity import check_parity
 from castblast.export.web import PAGE, to_web
+from castblast.resources import resource
+from castblast.stages.export import export
 from castblast.stages.web import build_page, shipped_page
 from castblast.surrogate.history_modes import FORMAT, fit_history_modes
 
@@ -155,6 +157,12 @@ def test_histories_of_other_data_are_refused(histories: dict, tmp_path) -> None:
     record.write_text(json.dumps(histories))
     with pytest.raises(SpecError, match="trained on other data"):
         build_page(network, tmp_path / "network.json")
+
+
+def test_histories_are_for_the_page_only(tmp_path) -> None:
+    network = resource("models/chosen/network.json")
+    with pytest.raises(SpecError, match="for the target web, not for c, js"):
+        export(network, tmp_path, targets=("c", "js"), histories=tmp_path / "histories.json")
 
 
 def test_a_page_without_histories_says_so(page: str) -> None:

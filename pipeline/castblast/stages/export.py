@@ -76,6 +76,9 @@ def export(
         A file that does not give the answers of the fitted estimator.
     """
     wanted = _targets(targets)
+    if histories is not None and "web" not in wanted:
+        message = f"histories: {histories} is for the target web, not for {', '.join(wanted)}"
+        raise SpecError(message)
     source = _find_source(fit)
     folder = source.parent / "export" if out is None else out
     _require_writable(folder)

@@ -30,7 +30,7 @@ from castblast.surrogate.training import Fit
 _OBSERVERS = (
     "comparison", "gate", "shifts", "strata", "learning", "sensitivity", "tuning", "tuning_space",
     "study_file", "timing", "tracking", "logged_model", "run_list", "infill", "probe",
-    "domain", "ensemble", "fit_store", "torch_onnx",
+    "domain", "ensemble", "fit_store", "torch_onnx", "history_modes",
 )  # fmt: skip
 _LIBRARIES = ("numpy", "scikit-learn", "torch")
 _PACKAGE = Path(__file__).resolve().parent.parent
