@@ -185,6 +185,7 @@ def next_commands(demo: Demo) -> list[str]:
     """Commands worth trying after the demo."""
     network = demo.network.as_posix()
     return [
+        "castblast web",
         f'castblast predict --network {network} --explosive anfo --burden "4 m" --ucs "80 MPa"',
         'castblast simulate --explosive gassed_emulsion --set burden="4 m" --out simulation',
         f"castblast dataset describe {demo.dataset.as_posix()}",
