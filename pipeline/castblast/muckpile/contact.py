@@ -36,6 +36,8 @@ Vector: TypeAlias = tuple[float, float, float]
 ROW = 8
 #: Stands for zero in a denominator, in single precision as well.
 _TINY = 1e-30
+#: A slipping contact is at its limit but for rounding, which in single precision takes some 1e-7.
+_ALMOST = 1.0 - 1e-5
 
 
 class DashpotMode(IntEnum):
@@ -100,6 +102,8 @@ class Constants(NamedTuple):
     cap_on_total : bool
     zero, half, one, tiny : float
         Numbers of the law in its working precision; a plain 0.5 would turn all into double.
+    almost : float [-]
+        Share of the limit from which on a contact counts as slipping.
     """
 
     modulus: float
@@ -116,6 +120,7 @@ class Constants(NamedTuple):
     half: float
     one: float
     tiny: float
+    almost: float
 
 
 def law_constants(law: ContactLaw, real: DTypeLike = np.float64) -> Constants:
@@ -138,6 +143,7 @@ def law_constants(law: ContactLaw, real: DTypeLike = np.float64) -> Constants:
         kind(0.5),
         kind(1.0),
         kind(_TINY),
+        kind(_ALMOST),
     )
 
 

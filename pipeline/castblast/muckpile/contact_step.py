@@ -148,9 +148,10 @@ def step_contact(
         hidden,
         law,
     )
-    # At the limit is slipping: a frictionless contact slips before its spring has grown.
+    # At the limit is slipping: a frictionless contact slips before its spring has grown, and one
+    # that slipped still does where a state is looked at anew (a firing), whatever was rounded.
     rests = law.slip_cut and not law.cap_on_total
-    drag = (drag if length < friction * grip else law.zero) if rests else drag
+    drag = (drag if length < law.almost * friction * grip else law.zero) if rests else drag
 
     wn = rx * nx + ry * ny + rz * nz
     kr = ks * effective * effective
