@@ -101,8 +101,7 @@ def test_link_restores_the_design(page, browser) -> None:
     page.locator("#field-burden").fill("3.33")
     page.locator("#keep").click()
     page.locator("[role=tab]").nth(1).click()
-    page.wait_for_timeout(500)  # the link is written a little later
-    assert "b.burden=3.33" in page.url
+    page.wait_for_url("**b.burden=3.33*")  # the link is written a little later
     second = browser.new_page()
     second.goto(page.url)
     second.wait_for_selector("#results li")
@@ -116,8 +115,7 @@ def test_link_restores_the_design(page, browser) -> None:
 
 def test_a_broken_link_says_so(page) -> None:
     page.goto(shipped_page().as_uri() + "#explosive=nitro&burden=x")
-    page.wait_for_timeout(200)
-    assert "no complete design" in page.locator("#notice").inner_text()
+    page.locator("#notice", has_text="no complete design").wait_for()
 
 
 def test_tabs_by_keyboard(page) -> None:

@@ -118,9 +118,9 @@ function rebuild() {
   draw();
 }
 
-function restore() {
-  const { design, kept, system } = fromHash(location.hash);
-  if (location.hash.length > 1 && !design) at("notice").textContent = "The link holds no complete design for this model; the usual design is shown.";
+function restore(hash) {
+  const { design, kept, system } = fromHash(hash);
+  if (hash.length > 1 && !design) at("notice").textContent = "The link holds no complete design for this model; the usual design is shown.";
   state.design = design ?? state.design;
   state.kept = kept;
   state.system = system ?? state.system;
@@ -158,12 +158,13 @@ at("copy").addEventListener("click", async () => {
 at("batch-template").addEventListener("click", () => download("designs.csv", batchTemplate(state.design)));
 at("batch-save").addEventListener("click", () => download("answers.csv", state.batch));
 at("batch-file").addEventListener("change", async () => { const file = at("batch-file").files[0]; if (file) runBatch(await file.text()); });
-window.addEventListener("hashchange", restore);
+// What came with the event: the bar may have got the link of the present design meanwhile.
+window.addEventListener("hashchange", (event) => restore(new URL(event.newURL).hash));
 if (facts.histories) {
   const { rows, pressure_error_50: half, pressure_error_95: most, inside_band: covered, share_error_95: share } = facts.histories.held_out;
   at("history-error").textContent = `From simulated histories, by principal components: on ${rows} designs that the fit has not seen, half of all points are within ${percent(half)} and 95 % within ${percent(most)} of the simulated pressure; the shaded band holds ${percent(covered, 3)} of them. Energy shares: 95 % within ${percent(share)} of the energy of the explosive.`;
 }
-restore();
+restore(location.hash);
 const deviation = selfTest();
 at("self-test").textContent = deviation < 1e-12 ? `Self-test passed: golden rows reproduced to ${deviation.toExponential(1)}.` : `Self-test FAILED (${deviation.toExponential(1)}): do not use this page in this browser.`;
 at("self-test").classList.toggle("failed", !(deviation < 1e-12));
