@@ -6,19 +6,20 @@ No fast-math: results must be the same from run to run.
 
 Compiled code is cached in a folder named by the hash of every kernel source. Numba's own cache
 only watches the file of the outermost function, so an edit in an imported kernel would go
-unnoticed; a hash over all sources cannot.
+unnoticed; a hash over all sources cannot. Numba unpickles what it finds there, so without a folder
+that is surely this user's own nothing is cached, and each process compiles for itself.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
-import sys
-import tempfile
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast
+
+from castblast.caches import cache_folder
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -38,26 +39,13 @@ def source_hash(entries: tuple[str, ...] = _SOURCES) -> str:
     return digest.hexdigest()
 
 
-def _cache_root() -> Path:
-    base = os.environ.get("CASTBLAST_CACHE_DIR")
-    if base:
-        return Path(base)
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA", Path.home())) / "castblast"
-    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "castblast"
-
-
 @cache
-def _prepare_cache() -> str:
-    """Name the cache folder before Numba is imported and return it."""
-    folder = _cache_root() / "kernels" / source_hash()[:16]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError:
-        folder = Path(tempfile.gettempdir()) / f"castblast-kernels-{source_hash()[:16]}"
-        folder.mkdir(parents=True, exist_ok=True)
+def _prepare_cache() -> str | None:
+    """Name the cache folder before Numba is imported and return it; None: nothing is kept."""
+    folder = cache_folder("kernels", source_hash()[:16])
+    if folder is None:
+        os.environ.pop("NUMBA_CACHE_DIR", None)
+        return None
     os.environ["NUMBA_CACHE_DIR"] = str(folder)
     return str(folder)
 
@@ -106,10 +94,10 @@ def _compile(
     import numba
 
     # An earlier import of numba has read its settings already.
-    numba.config.CACHE_DIR = folder
+    numba.config.CACHE_DIR = folder or ""
     options: dict[str, Any] = {
         "nogil": True,
-        "cache": True,
+        "cache": folder is not None,
         "error_model": "numpy",
         "parallel": parallel,
         "forceinline": inline,

@@ -97,7 +97,8 @@ def run_python(
 @cache
 def oldest_python() -> tuple[str, str]:
     """Oldest CPython from 3.6 on that starts here, of pyenv or on the path: program, version."""
-    kept = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv")) / "versions"
+    home = Path(os.environ.get("HOME", "/"))
+    kept = Path(os.environ.get("PYENV_ROOT") or home / ".pyenv") / "versions"
     for minor in range(OLDEST[1], sys.version_info.minor):
         name = f"python3.{minor}"
         found = [str(path) for path in sorted(kept.glob(f"3.{minor}.*/bin/{name}"))]
