@@ -91,7 +91,20 @@ def test_design_for_the_surrogate_takes_the_geometry_of_the_bench(tmp_path: Path
         ),
         ({"balls": {}}, "exactly one of 'mean_radius', 'count' and 'file' is needed"),
         ({"balls": {"count": 3}}, "balls.count: 3: input should be greater than or equal to 10"),
-        ({"velocity": "12.7 km/s"}, "velocity: 12.7 km/s: implausible; allowed: 0 to 100 m s-1"),
+        (
+            {"velocity": "12.7 km/s"},
+            "velocity: 12.7 km/s: implausible (12700 m s-1); allowed: 0 to 100 m s-1",
+        ),
+        # A bearing and dips of holes, whichever way they count, are no directions of a throw.
+        (
+            {"direction": {"azimuth": "175.94 deg"}},
+            "direction.azimuth: 175.94 deg: implausible (175.94 deg); allowed: -90 to 90 deg; "
+            "a bearing or a dip is that of the hole, not of the throw",
+        ),
+        ({"direction": {"azimuth": "-180 deg"}}, "allowed: -90 to 90 deg; a bearing"),
+        ({"direction": {"elevation": "-90 deg"}}, "allowed: -45 to 60 deg; a bearing or a dip"),
+        ({"direction": {"elevation": "90 deg"}}, "allowed: -45 to 60 deg; a bearing or a dip"),
+        ({"direction": {"elevation": "75 deg"}}, "allowed: -45 to 60 deg; a bearing or a dip"),
         ({"velocity": None}, "either 'velocity' or 'surrogate' is needed"),
         ({"surrogate": {"explosive": "anfo"}}, "either 'velocity' or 'surrogate' is needed"),
         ({"surrogate": {"usc": "3 MPa"}}, "usc: unknown variable, did you mean 'ucs'?"),

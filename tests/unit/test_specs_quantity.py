@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import subprocess
 import sys
 
@@ -11,7 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from castblast.errors import SpecError
-from castblast.specs.quantity import parse_quantity, parse_variable
+from castblast.specs.quantity import (
+    QuantityError,
+    QuantityIn,
+    parse_quantity,
+    parse_variable,
+)
 from castblast.variables import VARIABLES
 
 
@@ -130,6 +136,27 @@ def test_no_text_gets_through_as_another_error(text: str) -> None:
     except SpecError:
         return
     assert math.isfinite(value)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "written", "said"),
+    [
+        (QuantityIn("m", above=0.0), "0 m", "must be larger than 0 m"),
+        (QuantityIn("m", 0.0, 5.0), "7000 mm", "implausible (7 m); allowed: 0 to 5 m"),
+        (QuantityIn("rad", -1.0, math.pi / 3.0), "61 deg", "(61 deg); allowed: -57.2958 to 60 deg"),
+        (QuantityIn("1", 0.0, 0.2, hint="a share"), 0.5, "allowed: 0 to 0.2; a share"),
+    ],
+)
+def test_a_range_is_said_in_the_unit_of_people(
+    quantity: QuantityIn, written: object, said: str
+) -> None:
+    """Bounds are allowed themselves, in spite of rounding; an open end allows anything."""
+    with pytest.raises(QuantityError, match=re.escape(said)):
+        quantity.parse(written)
+    assert QuantityIn("rad", 0.0, math.pi / 3.0).parse("60 deg") == pytest.approx(math.pi / 3.0)
+    assert QuantityIn("m", 0.0).parse("1e9 m") == 1e9
+    with pytest.raises(QuantityError):
+        QuantityIn("m", 0.0).parse("-1 mm")
 
 
 def test_units_do_not_load_the_heavy_libraries() -> None:

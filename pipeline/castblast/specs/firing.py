@@ -15,6 +15,10 @@ from castblast.specs.loading import Spec
 from castblast.specs.quantity import QuantityError, QuantityIn
 
 _RIGHT_ANGLE = math.pi / 2.0
+_NO_HOLE = "a bearing or a dip is that of the hole, not of the throw: leave it out"
+#: Directions that a throw can have; the columns of a file of holes are held against them as well.
+THROW_AZIMUTH = QuantityIn("rad", -_RIGHT_ANGLE, _RIGHT_ANGLE, hint=_NO_HOLE)
+THROW_ELEVATION = QuantityIn("rad", -math.pi / 4.0, math.pi / 3.0, hint=_NO_HOLE)
 _Delay = Annotated[float, QuantityIn("s", 0.0, 10.0)]
 #: What each pattern knows besides `start`, `hold_unfired` and `scatter`.
 _KNOWN = {
@@ -125,9 +129,11 @@ class Direction(Spec):
     azimuth : float [rad]
         In plan from that normal, positive towards larger y.
     elevation : float [rad]
-        Over the horizontal.
+        Over the horizontal. A burden is thrown forwards, so what is steeper than -45 or 60 deg is
+        taken for the dip of a hole and refused, as an azimuth that points backwards is for a
+        bearing.
     """
 
     normal_to: Literal["face", "firing_front"] = "face"
-    azimuth: Annotated[float, QuantityIn("rad", -_RIGHT_ANGLE, _RIGHT_ANGLE)] = 0.0
-    elevation: Annotated[float, QuantityIn("rad", -_RIGHT_ANGLE, _RIGHT_ANGLE)] = 0.0
+    azimuth: Annotated[float, THROW_AZIMUTH] = 0.0
+    elevation: Annotated[float, THROW_ELEVATION] = 0.0

@@ -49,8 +49,7 @@ def convert_variable(name: str, value: object) -> float:
 
 def _within(number: float, lower: float, upper: float) -> bool:
     """Compare with a rounding margin: 60 deg must pass a bound of 60 deg."""
-    margin = 1e-12 * max(abs(lower), abs(upper))
-    return lower - margin <= number <= upper + margin
+    return lower - 1e-12 * abs(lower) <= number <= upper + 1e-12 * abs(upper)
 
 
 def allowed(variable: Variable) -> str:
@@ -107,24 +106,40 @@ class QuantityIn:
         Allowed range, both ends included.
     above : float [unit]
         The value must be larger than this.
+    hint : str
+        What a value outside the range most likely is, for the message.
     """
 
     unit: str
     lower: float = -math.inf
     upper: float = math.inf
     above: float = -math.inf
+    hint: str = ""
 
     def parse(self, value: object) -> float:
         """Read one value; a ValueError says what is wrong."""
-        number = convert(value, self.unit)
-        shown = "" if self.unit == "1" else f" {self.unit}"
+        return self.check(convert(value, self.unit))
+
+    def check(self, number: float) -> float:
+        """Hold a value in `unit` against the range; a ValueError says what is allowed.
+
+        For columns of tables, whose numbers are converted all at once.
+        """
         if not number > self.above:
-            message = f"must be larger than {self.above:.6g}{shown}"
-            raise QuantityError(message)
-        if not self.lower <= number <= self.upper:
-            message = f"implausible; allowed: {self.lower:.6g} to {self.upper:.6g}{shown}"
-            raise QuantityError(message)
-        return number
+            message = f"must be larger than {self._show(self.above)}"
+        elif not _within(number, self.lower, self.upper):
+            low = self._show(self.lower).split()[0]
+            found = "" if self.unit == "1" else f" ({self._show(number)})"
+            message = f"implausible{found}; allowed: {low} to {self._show(self.upper)}"
+        else:
+            return number
+        raise QuantityError(message + (f"; {self.hint}" if self.hint else ""))
+
+    def _show(self, number: float) -> str:
+        """Write a value with its unit; angles in degrees."""
+        if self.unit == "rad":
+            return f"{math.degrees(number):.6g} deg"
+        return f"{number:.6g}" if self.unit == "1" else f"{number:.6g} {self.unit}"
 
     def __get_pydantic_core_schema__(
         self, source: object, handler: GetCoreSchemaHandler
