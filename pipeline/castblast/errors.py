@@ -51,6 +51,10 @@ class SpecError(CastblastError):
     exit_code = 2
 
 
+class MissingLibraryError(SpecError):
+    """What was asked for needs a library of an extra that is not installed."""
+
+
 class StaleResultError(SpecError):
     """Results of an earlier run that were made from something else stand in the way."""
 

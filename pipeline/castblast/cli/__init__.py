@@ -21,6 +21,7 @@ def main(arguments: list[str] | None = None) -> int:
     debug = "--debug" in given
     from castblast.cli.app import app
     from castblast.errors import CastblastError
+    from castblast.extras import explained
 
     try:
         app(given, prog_name="castblast")
@@ -35,6 +36,11 @@ def main(arguments: list[str] | None = None) -> int:
         where = f"{error.filename}: " if error.filename else ""
         return _report(error, f"{where}{error.strerror or error}", 2, given, debug)
     except Exception as error:
+        if isinstance(error, ModuleNotFoundError):
+            verb = next((word for word in given if not word.startswith("-")), "")
+            missing = explained(error, f"castblast {verb}".rstrip())
+            if missing is not None:
+                return _report(error, str(missing), missing.exit_code, given, debug)
         first = next(iter(str(error).splitlines()), "")
         message = f"internal error: {type(error).__name__}: {first} (--debug shows where)"
         return _report(error, message, 1, given, debug)

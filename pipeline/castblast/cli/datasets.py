@@ -17,7 +17,7 @@ app = typer.Typer(
 _Dataset = Annotated[Path, typer.Argument(help="Dataset (netCDF).")]
 
 
-@verb(app)
+@verb(app, needs=("simulate", "data"))
 def check(screen: Screen, dataset: _Dataset) -> Mapping[str, Any]:
     """Check a dataset against the format and report all faults (exit code 4 if there are any)."""
     from castblast.stages.dataset import check_dataset
@@ -33,7 +33,7 @@ def check(screen: Screen, dataset: _Dataset) -> Mapping[str, Any]:
     return {"dataset": str(dataset), "faults": faults}
 
 
-@verb(app)
+@verb(app, needs=("simulate", "data"))
 def describe(screen: Screen, dataset: _Dataset) -> Mapping[str, Any]:
     """Say what a dataset holds: size, ranges, failures, versions."""
     from castblast.stages.dataset import describe_dataset
@@ -45,7 +45,7 @@ def describe(screen: Screen, dataset: _Dataset) -> Mapping[str, Any]:
     return description.document
 
 
-@verb(app)
+@verb(app, needs=("simulate", "data"))
 def reproduce(
     screen: Screen,
     dataset: _Dataset,
@@ -62,7 +62,7 @@ def reproduce(
     return outcome.document
 
 
-@verb(app)
+@verb(app, needs=("simulate", "data"))
 def extend(
     screen: Screen,
     dataset: _Dataset,
@@ -104,7 +104,7 @@ def extend(
     return outcome.document
 
 
-@verb(app)
+@verb(app, needs=("simulate", "data"))
 def diff(
     screen: Screen,
     first: Annotated[Path, typer.Argument(help="Dataset (netCDF).")],

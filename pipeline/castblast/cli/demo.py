@@ -37,4 +37,4 @@ def demo(
 
 def add_to(app: typer.Typer) -> None:
     """Register the verb."""
-    verb(app)(demo)
+    verb(app, needs=("simulate", "data", "train", "plot", "onnx"))(demo)

@@ -42,4 +42,4 @@ def generate(
 
 def add_to(app: typer.Typer) -> None:
     """Register the verb."""
-    verb(app)(generate)
+    verb(app, needs=("simulate", "data"))(generate)

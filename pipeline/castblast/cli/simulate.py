@@ -77,4 +77,4 @@ def simulate(
 
 def add_to(app: typer.Typer) -> None:
     """Register the verb."""
-    verb(app)(simulate)
+    verb(app, needs=("simulate",))(simulate)

@@ -14,7 +14,14 @@ if TYPE_CHECKING:
     from castblast.stages.train import TrainOutcome
 
 _Dataset = Annotated[Path, typer.Argument(help="Dataset (netCDF).")]
-_Tracking = Annotated[bool, typer.Option(help="Keep a record of the runs in MLflow.")]
+_Tracking = Annotated[
+    bool | None,
+    typer.Option(
+        "--tracking/--no-tracking",
+        help="Keep a record of the runs in MLflow; default: if MLflow is installed.",
+        show_default=False,
+    ),
+]
 _Runs = Annotated[Path, typer.Option(help="Folder of the MLflow record.")]
 _Workers = Annotated[
     int | None,
@@ -37,7 +44,7 @@ def train(
     ] = None,
     out: OutFolder = None,
     workers: _Workers = None,
-    tracking: _Tracking = True,
+    tracking: _Tracking = None,
     runs: _Runs = _RUNS,
 ) -> Mapping[str, Any]:
     """Fit models and score them on rows never trained on; fits that are there stay."""
@@ -49,7 +56,7 @@ def train(
             specs or [],
             out,
             workers=workers,
-            tracking=tracking,
+            tracking=_is_tracked(screen, tracking),
             runs=runs,
             progress=progress,
         )
@@ -74,7 +81,7 @@ def tune(
     ] = None,
     out: OutFolder = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the sampler.")] = 0,
-    tracking: _Tracking = True,
+    tracking: _Tracking = None,
     runs: _Runs = _RUNS,
 ) -> Mapping[str, Any]:
     """Search the settings that a spec declares; a study that was stopped goes on."""
@@ -89,7 +96,7 @@ def tune(
             study=study,
             out=out,
             seed=seed,
-            tracking=tracking,
+            tracking=_is_tracked(screen, tracking),
             runs=runs,
             progress=progress,
         )
@@ -117,7 +124,7 @@ def compare(
         bool, typer.Option("--quick", help="A first look: fewer rows and iterations.")
     ] = False,
     workers: _Workers = None,
-    tracking: _Tracking = True,
+    tracking: _Tracking = None,
     runs: _Runs = _RUNS,
 ) -> Mapping[str, Any]:
     """Rank models on rows never trained on, ask them for physics, choose one (exit code 4: none).
@@ -135,7 +142,7 @@ def compare(
             fits=fits,
             extent=QUICK if quick else FULL,
             workers=workers,
-            tracking=tracking,
+            tracking=_is_tracked(screen, tracking),
             runs=runs,
             progress=progress,
         )
@@ -203,6 +210,15 @@ def export(
     for line in outcome.lines:
         screen.say(line)
     return outcome.document
+
+
+def _is_tracked(screen: Screen, wanted: bool | None) -> bool:
+    """Whether to keep a record: as asked for, else where the library for it is installed."""
+    from castblast.extras import install_command, is_installed
+
+    if wanted is None and not is_installed("mlflow"):
+        screen.note(f"no record of the runs is kept: {install_command(['mlflow'])} for one")
+    return is_installed("mlflow") if wanted is None else wanted
 
 
 def _show(screen: Screen, outcome: "TrainOutcome") -> Mapping[str, Any]:

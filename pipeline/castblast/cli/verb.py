@@ -11,6 +11,7 @@ from typing import Annotated, Any, TypeAlias, get_type_hints
 import typer
 
 from castblast.cli.screen import Screen
+from castblast.extras import require
 
 Verb: TypeAlias = Callable[..., Mapping[str, Any] | None]
 
@@ -23,12 +24,26 @@ _SHARED = {
 }
 
 
-def verb(app: typer.Typer, name: str | None = None) -> Callable[[Verb], Verb]:
-    """Register a function of (screen, ...) as a verb of `app`."""
+def verb(
+    app: typer.Typer, name: str | None = None, needs: tuple[str, ...] = ()
+) -> Callable[[Verb], Verb]:
+    """Register a function of (screen, ...) as a verb of `app`.
+
+    Parameters
+    ----------
+    app : typer.Typer
+    name : str, optional
+        Default: that of the function.
+    needs : tuple of str
+        Extras of castblast without which it is not begun.
+    """
 
     def register(function: Verb) -> Verb:
-        def command(as_json: bool, quiet: bool, debug: bool, **options: Any) -> None:
+        def command(
+            context: typer.Context, as_json: bool, quiet: bool, debug: bool, **options: Any
+        ) -> None:
             screen = Screen(as_json, quiet, debug)
+            require(*needs, purpose=context.command_path)
             payload = function(screen, **options)
             if screen.as_json and payload is not None:
                 screen.document(payload)
@@ -45,8 +60,11 @@ def verb(app: typer.Typer, name: str | None = None) -> Callable[[Verb], Verb]:
             inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
             for key, kind in _SHARED.items()
         ]
-        command.__signature__ = inspect.Signature(own + shared)  # type: ignore[attr-defined]
-        command.__annotations__ = {p.name: p.annotation for p in own + shared}
+        place = inspect.Parameter(
+            "context", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context
+        )
+        command.__signature__ = inspect.Signature([place, *own, *shared])  # type: ignore[attr-defined]
+        command.__annotations__ = {p.name: p.annotation for p in (place, *own, *shared)}
         command.__doc__ = function.__doc__
         # A verb may be called `check` in two groups: its own name is the default.
         app.command(name or function.__name__.replace("_", "-"))(command)

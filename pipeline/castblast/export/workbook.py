@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from castblast.errors import SpecError
 from castblast.export.lookup import lookup_csv
 from castblast.export.plain import Files, compact
 from castblast.export.sheet_block import Block, Constants, letter, span, write_block
+from castblast.extras import require
 from castblast.network import Network
 
 if TYPE_CHECKING:
@@ -35,14 +35,11 @@ def to_excel(network: Network) -> Files:
 
     Raises
     ------
-    SpecError
+    MissingLibraryError
         openpyxl is not installed.
     """
-    try:
-        import openpyxl
-    except ImportError:
-        message = "export target 'excel': needs openpyxl, pip install 'castblast[excel]'"
-        raise SpecError(message) from None
+    require("excel", purpose="export target 'excel'")
+    import openpyxl
     from openpyxl.worksheet.properties import PageSetupProperties
 
     book = openpyxl.Workbook()

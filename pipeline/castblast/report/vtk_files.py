@@ -17,6 +17,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from castblast.errors import SpecError
+from castblast.extras import require
 from castblast.files import write_text, write_with
 from castblast.muckpile.particles import Particles
 
@@ -31,11 +32,12 @@ def need_vtk(option: str) -> None:
     SpecError
         What to install.
     """
+    require("vtk", purpose=option)
     try:
         from vtkmodules.vtkIOHDF import vtkHDFWriter  # noqa: F401
         from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter  # noqa: F401
     except ImportError:
-        message = f'{option}: needs VTK 9.4 or later: pip install "castblast[vtk]"'
+        message = f'{option}: needs VTK 9.4 or later: pip install -U "castblast[vtk]"'
         raise SpecError(message) from None
 
 

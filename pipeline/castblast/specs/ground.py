@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from castblast.errors import SpecError, nearest_name
+from castblast.extras import require
 from castblast.muckpile.particles import FloatArray
 from castblast.muckpile.terrain import height_faults, heightmap, surface_faults
 from castblast.muckpile.walls import Walls, join, surface
@@ -298,10 +299,9 @@ def read_stl(path: Path) -> FloatArray:
     """
     if not path.is_file():
         raise SpecError(f"{path}: no such file")
-    try:
-        import trimesh
-    except ImportError:
-        raise SpecError(f"{path}: STL files need: pip install 'castblast[stl]'") from None
+    require("stl", purpose=f"{path}: an STL file")
+    import trimesh
+
     try:
         mesh = trimesh.load_mesh(str(path), file_type="stl", process=False)
         corner = np.asarray(mesh.triangles, dtype=np.float64)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
@@ -94,6 +94,9 @@ class SurrogateSpec(Spec):
     search : mapping, optional
         Settings that a study may change; no part of the model, so not of its hash.
     """
+
+    #: Extras of castblast that the family needs besides what all families need.
+    needs: ClassVar[tuple[str, ...]] = ()
 
     name: str = Field(min_length=1, pattern=r"^[a-z0-9_]+$")
     description: str = ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
@@ -124,6 +124,8 @@ class TorchSpec(RandomStarts):
     per_explosive : bool
         A network for each explosive; needs ``explosive_code: one_hot``.
     """
+
+    needs: ClassVar[tuple[str, ...]] = ("torch",)
 
     kind: Literal["torch_mlp"] = "torch_mlp"
     hidden_layers: HiddenLayers = Field((32, 32), min_length=1)

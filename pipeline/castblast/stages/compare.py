@@ -25,7 +25,15 @@ from castblast.stages.compare_parts import (
     shift_part,
     sobol_part,
 )
-from castblast.stages.fitting import fit_all, fit_files, kept_fits, note_dataset, read_rows
+from castblast.stages.fitting import (
+    fit_all,
+    fit_files,
+    kept_fits,
+    note_dataset,
+    read_rows,
+    require_training,
+    without_missing,
+)
 from castblast.stages.reuse import file_hash
 from castblast.stages.train import RUNS_FOLDER, TrainOutcome
 
@@ -154,6 +162,8 @@ def compare(
 ) -> TrainOutcome:
     """Fit what is not fitted yet, judge all models and choose one.
 
+    A model whose library is not installed is left out, and a remark names the extra.
+
     Parameters
     ----------
     dataset : path
@@ -175,16 +185,21 @@ def compare(
 
     Raises
     ------
+    MissingLibraryError
+        A library that every comparison, or every one of the models, needs is not installed.
     SpecError
         An unusable spec; no model that can be exported and passes the gate.
     DatasetError
         An unusable dataset.
     """
+    started = time.perf_counter()
+    dataset, wanted, fits = _sources(dataset, specs, fits, extent)
+    require_training("castblast compare", (), tracking=tracking)
+    remarks: list[str] = []
+    wanted = without_missing(wanted, remarks)
     from castblast.dataset.store import open_dataset, require_writable
     from castblast.stages.compare_report import comparison_document, outcome, write_comparison
 
-    started = time.perf_counter()
-    dataset, wanted, fits = _sources(dataset, specs, fits, extent)
     table = read_rows(open_dataset(dataset), wanted, dataset)
     if extent.train_rows is not None:
         table = table.with_train_rows(extent.train_rows)
@@ -193,7 +208,8 @@ def compare(
         require_writable(folder)
     note_dataset(fits, dataset)
     made = fit_all(wanted, table, fits, workers=workers, progress=part(progress, 0.0, 0.5))
-    found = _judge(made, table, dataset, fits, extent, workers, part(progress, 0.5, 0.95))
+    judging = part(progress, 0.5, 0.95)
+    found = _judge(made, table, dataset, fits, extent, remarks, workers, judging)
     progress(0.95, "writing the report")
     document = comparison_document(found)
     files = write_comparison(out, found, document, time.perf_counter() - started)
@@ -240,6 +256,7 @@ def _judge(
     dataset: Path,
     folder: Path,
     extent: Extent,
+    remarks: list[str],
     workers: int | None,
     progress: ProgressCallback,
 ) -> Comparison:
@@ -247,7 +264,6 @@ def _judge(
     from castblast.surrogate.comparison import compare as league_of
     from castblast.surrogate.gate import check_physics
 
-    remarks: list[str] = []
     domain = _domain_or_remark(dataset, remarks)
     about = {"dataset": file_hash(dataset)}
     parts = [_curve(fit, table, about, extent) for fit in fits if extent.every_curve]

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from castblast.errors import SpecError, StaleResultError
+from castblast.extras import is_installed
 from castblast.progress import ProgressCallback
 from castblast.resources import resource
 from castblast.stages.reuse import is_valid, make_key, mark_valid
@@ -103,7 +104,7 @@ def _train(demo: Demo, progress: ProgressCallback) -> list[str]:
         fits=demo.out / "fits",
         extent=DEMO,
         workers=demo.workers,
-        tracking=True,
+        tracking=is_installed("mlflow"),
         runs=demo.out / "runs",
         progress=progress,
     )

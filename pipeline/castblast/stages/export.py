@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from castblast.errors import CheckError, SpecError, nearest_name
 from castblast.export.json_file import read_network
+from castblast.extras import require
 from castblast.files import write_text, write_with
 from castblast.network import Network
 from castblast.progress import ProgressCallback, silent
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
 #: Every target; `all` stands for them together.
 TARGET_NAMES = ("json", "onnx", "c", "js", "python", "pfc", "lammps", "excel", "web")
+#: Extras that some of them need.
+_EXTRAS = {"onnx": ("onnx",), "excel": ("excel",)}
 
 
 @dataclass(frozen=True)
@@ -70,6 +73,8 @@ def export(
 
     Raises
     ------
+    MissingLibraryError
+        A target needs a library that is not installed.
     SpecError
         No usable network, an unknown target, a folder that cannot be written.
     CheckError
@@ -79,6 +84,8 @@ def export(
     if histories is not None and "web" not in wanted:
         message = f"histories: {histories} is for the target web, not for {', '.join(wanted)}"
         raise SpecError(message)
+    for target in wanted:
+        require(*_EXTRAS.get(target, ()), purpose=f"export target '{target}'")
     source = _find_source(fit)
     folder = source.parent / "export" if out is None else out
     _require_writable(folder)

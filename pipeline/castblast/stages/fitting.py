@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from castblast.errors import DatasetError, SpecError
+from castblast.extras import missing_libraries, missing_line, require
 from castblast.files import write_csv, write_text
 from castblast.progress import ProgressCallback, part, silent
 from castblast.stages.jobs import Job, available_cores, run_jobs
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 #: A finished fit as it is kept for this machine.
 FIT_STORE = "fit.pickle"
 _DATASET = "dataset.txt"
+#: Extras without which nothing is fitted, scored and drawn.
+_ALWAYS = ("data", "simulate", "train", "plot")
 
 
 def read_rows(dataset: Any, specs: Sequence[ModelSpec], path: Path) -> Table:
@@ -45,6 +48,52 @@ def read_rows(dataset: Any, specs: Sequence[ModelSpec], path: Path) -> Table:
     except DatasetError as fault:
         lines = "\n".join(f"{path}: {line}" for line in str(fault).splitlines())
         raise DatasetError(lines) from None
+
+
+def require_training(
+    purpose: str, specs: Sequence[ModelSpec], *extras: str, tracking: bool = False
+) -> None:
+    """Refuse to begin where a library is missing that would be needed after minutes of fitting.
+
+    Parameters
+    ----------
+    purpose : str
+        The verb.
+    specs : sequence of ModelSpec
+    *extras : str
+        What the verb needs besides what all fits need.
+    tracking : bool
+        A record is to be kept in MLflow.
+
+    Raises
+    ------
+    MissingLibraryError
+    """
+    record = ("track",) if tracking else ()
+    require(*_ALWAYS, *extras, *record, purpose=purpose)
+    for spec in specs:
+        require(*spec.needs, purpose=f"{spec.name}: kind {spec.kind}")
+
+
+def without_missing(specs: Sequence[ModelSpec], remarks: list[str]) -> list[ModelSpec]:
+    """Give the specs whose libraries are installed; what is left out goes to `remarks`.
+
+    Raises
+    ------
+    MissingLibraryError
+        None is left.
+    """
+    left_out = {spec.name: missing_libraries(*spec.needs) for spec in specs}
+    able = [spec for spec in specs if not left_out[spec.name]]
+    if not able:
+        require_training("castblast compare", specs)
+    kinds = {spec.name: spec.kind for spec in specs}
+    remarks += [
+        f"left out: {missing_line(missing, f'{name}: kind {kinds[name]}')}"
+        for name, missing in left_out.items()
+        if missing
+    ]
+    return able
 
 
 def fit_all(

@@ -9,6 +9,7 @@ from typing import Any
 
 from castblast.blast import BlastResult, BlastSettings, make_case, result_values, run_blast
 from castblast.errors import SimulationError, Status
+from castblast.extras import require
 from castblast.files import write_csv, write_text
 from castblast.inputs import resolve_inputs
 from castblast.nearfield.case import EndMode, TensionMode
@@ -62,6 +63,8 @@ def simulate(
     SimulationError
         The run did not reach its end state.
     """
+    if out is not None:
+        require("plot", purpose="castblast simulate --out")
     given = parse_values(values, where)
     spec = load_explosive(explosive)
     remarks = require_consistent(spec, allow_inconsistent=allow_inconsistent)

@@ -10,7 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 from castblast.progress import ProgressCallback, silent
 from castblast.resources import resource
-from castblast.stages.fitting import fit_all, fit_files, note_dataset, read_rows
+from castblast.stages.fitting import (
+    fit_all,
+    fit_files,
+    note_dataset,
+    read_rows,
+    require_training,
+)
 
 if TYPE_CHECKING:
     from castblast.surrogate.training import Fit
@@ -58,15 +64,19 @@ def train(
 
     Raises
     ------
+    MissingLibraryError
+        A library that training, one of the specs or the record needs is not installed.
     SpecError
         An unusable spec.
     DatasetError
         An unusable dataset: damaged, missing columns, too few rows.
     """
-    from castblast.dataset.store import open_dataset, require_writable
     from castblast.specs.model import read_model_specs
 
     chosen = read_model_specs(list(specs) or [resource("models/specs/reference_mlp.yaml")])
+    require_training("castblast train", chosen, tracking=tracking)
+    from castblast.dataset.store import open_dataset, require_writable
+
     table = read_rows(open_dataset(dataset), chosen, dataset)
     out = dataset.parent / "fits" if out is None else out
     require_writable(out)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from castblast.files import write_text
 from castblast.progress import ProgressCallback, silent
-from castblast.stages.fitting import read_rows, write_json
+from castblast.stages.fitting import read_rows, require_training, write_json
 from castblast.stages.train import RUNS_FOLDER, TrainOutcome, show_share
 
 if TYPE_CHECKING:
@@ -55,16 +55,20 @@ def tune(
 
     Raises
     ------
+    MissingLibraryError
+        A library that the study, the spec or the record needs is not installed.
     SpecError
         An unusable spec, search space or budget; a journal of another study.
     DatasetError
         An unusable dataset.
     """
-    from castblast.dataset.store import open_dataset, require_writable
     from castblast.specs.model import read_model_spec
-    from castblast.surrogate import tuning
 
     wanted = read_model_spec(spec)
+    require_training("castblast tune", [wanted], "tune", tracking=tracking)
+    from castblast.dataset.store import open_dataset, require_writable
+    from castblast.surrogate import tuning
+
     tuning.check_study(wanted, trials, timeout)
     table = read_rows(open_dataset(dataset), [wanted], dataset)
     folder = dataset.parent / "studies" / wanted.name if out is None else out

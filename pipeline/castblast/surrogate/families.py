@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from castblast.errors import SpecError
+from castblast.extras import require
 from castblast.specs.model import (
     CustomSpec,
     GaussianProcessSpec,
@@ -97,13 +97,8 @@ def _levenberg(spec: LevenbergSpec, table: Table, seed: int) -> Any:
 
 
 def _torch(spec: TorchSpec, table: Table, seed: int) -> Any:
-    try:
-        from castblast.surrogate.torch_mlp import TorchMlp
-    except ModuleNotFoundError as fault:
-        if fault.name != "torch":
-            raise
-        message = f"{spec.name}: kind torch_mlp needs PyTorch: pip install 'castblast[torch]'"
-        raise SpecError(message) from None
+    require("torch", purpose=f"{spec.name}: kind torch_mlp")
+    from castblast.surrogate.torch_mlp import TorchMlp
 
     return TorchMlp(
         hidden_layers=spec.hidden_layers,

@@ -18,6 +18,7 @@ from typing import Any, Literal
 
 from castblast import __version__
 from castblast.errors import CastblastError, SpecError
+from castblast.extras import require
 from castblast.progress import ProgressCallback, silent
 from castblast.specs.model import ModelSpec
 from castblast.specs.search import SearchSpace, search_faults
@@ -183,11 +184,8 @@ def _identity(spec: ModelSpec, space: SearchSpace, table: Table, seed: int) -> d
 @contextmanager
 def _quiet_optuna() -> Iterator[Any]:
     """Optuna without chatter; its earlier level is put back."""
-    try:
-        import optuna
-    except ImportError:
-        message = "a study needs Optuna: pip install 'castblast[tune]'"
-        raise SpecError(message) from None
+    require("tune", purpose="a study")
+    import optuna
 
     level = optuna.logging.get_verbosity()
     optuna.logging.set_verbosity(optuna.logging.ERROR)
