@@ -95,4 +95,6 @@ def check(screen: Screen, name: _Name) -> Mapping[str, Any]:
         screen.exit_code = 4
         for line in outcome.rejected:
             screen.note(f"error: {line}")
+        for line in outcome.remedies:
+            screen.note(line)
     return outcome.document

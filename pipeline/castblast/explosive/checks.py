@@ -32,6 +32,9 @@ from castblast.explosive.isentrope import ProductIsentrope, energy, pressure, sl
 
 #: Relative volume up to which the isentrope is held to be positive and convex.
 LARGEST_VOLUME = 2000.0
+#: Fields of an explosive file, as messages name them.
+_SHAPE_FIELDS = "jwl.A, B, R1, R2, omega"
+_STATE_FIELDS = "density, detonation_velocity"
 #: Pressure [Pa] down to which the work of the products is held against the heat of explosion.
 AMBIENT_PRESSURE = 1e5
 
@@ -55,15 +58,15 @@ def check_jwl(jwl: JwlSet, heat_of_explosion: float) -> list[Finding]:
         return signs
     complete = complete_jwl(jwl)
     if complete is None:
-        return [
-            *signs,
-            judge_flag("CJ state", 0.0, "a state below V = 1 on the Rayleigh line of D", False),
-        ]
+        limit = "a state below V = 1 on the Rayleigh line of D"
+        between = f"{_stated_by(jwl)} against {_STATE_FIELDS}"
+        return [*signs, judge_flag("CJ state", 0.0, limit, False, "", between)]
     c = complete.isentrope.c
-    findings = [
-        *signs,
-        judge_flag("C positive (units of A, B, C)", c * 1e-9, "> 0", c > 0.0, "GPa"),
-    ]
+    between = f"{_SHAPE_FIELDS}, E0 against {_STATE_FIELDS}"
+    if jwl.c is not None or jwl.cj_pressure is not None:
+        between = "jwl.C" if jwl.c is not None else f"{_SHAPE_FIELDS} against cj_pressure"
+    name = "C positive (units of A, B, C)"
+    findings = [*signs, judge_flag(name, c * 1e-9, "> 0", c > 0.0, "GPa", between)]
     findings += _cj_findings(complete.isentrope, complete.cj, jwl)
     findings += _jwl_energy(jwl, complete)
     if c > 0.0:
@@ -74,17 +77,22 @@ def check_jwl(jwl: JwlSet, heat_of_explosion: float) -> list[Finding]:
     return findings
 
 
+def _stated_by(jwl: JwlSet) -> str:
+    """Field that the CJ state of a set comes from, as in `complete_jwl`."""
+    if jwl.cj_pressure is not None:
+        return "cj_pressure"
+    return f"{_SHAPE_FIELDS}, {'C' if jwl.c is not None else 'E0'}"
+
+
 def _jwl_signs(jwl: JwlSet) -> list[Finding]:
     smallest = min(jwl.a, jwl.b)
+    ratio = jwl.r1 / jwl.r2 if jwl.r2 else math.inf
+    ordered, bounded = jwl.r1 > jwl.r2 > 0.0, 0.0 < jwl.omega < 1.0
+    fields = "jwl.A, jwl.B"
     return [
-        judge_flag("A and B positive", smallest * 1e-9, "> 0", smallest > 0.0, "GPa"),
-        judge_flag(
-            "R1 above R2",
-            jwl.r1 / jwl.r2 if jwl.r2 else math.inf,
-            "R1 > R2 > 0",
-            jwl.r1 > jwl.r2 > 0.0,
-        ),
-        judge_flag("omega", jwl.omega, "between 0 and 1", 0.0 < jwl.omega < 1.0),
+        judge_flag("A and B positive", smallest * 1e-9, "> 0", smallest > 0.0, "GPa", fields),
+        judge_flag("R1 above R2", ratio, "R1 > R2 > 0", ordered, "", "jwl.R1 against jwl.R2"),
+        judge_flag("omega", jwl.omega, "between 0 and 1", bounded, "", "jwl.omega"),
     ]
 
 
@@ -99,18 +107,24 @@ def _cj_findings(isentrope: ProductIsentrope, state: CjState, jwl: JwlSet) -> li
     on_curve = pressure(isentrope, volume)
     gap = on_curve / state.pressure - 1.0
     bend = slope(isentrope, volume) * on_curve / volume / steepness - 1.0
-    findings = [judge_range("gamma at the CJ state", state.gamma, (1.8, 4.0), (1.5, 5.0))]
+    stated, against = _stated_by(jwl), f"against {_STATE_FIELDS}"
+    name, fields = "gamma at the CJ state", f"{stated} {against}"
+    findings = [judge_range(name, state.gamma, (1.8, 4.0), (1.5, 5.0), fields)]
     if jwl.cj_pressure is None and jwl.c is not None:
         name = "tangency (P_s where it runs parallel to the Rayleigh line of D, against that line)"
-        findings.append(judge_deviation(name, gap, 0.02, 0.05))
+        findings.append(judge_deviation(name, gap, 0.02, 0.05, fields))
     else:
         name = "tangency (slope at the CJ state against rho0 D^2)"
-        findings.append(judge_deviation(name, bend, 0.02, 0.05))
+        also = ", cj_pressure" if jwl.cj_pressure is not None else ""
+        fields = f"{_SHAPE_FIELDS if also else stated} {against}{also}"
+        findings.append(judge_deviation(name, bend, 0.02, 0.05, fields))
         if jwl.c is not None:
             name = "P_s(V_J) with the stated C against P_CJ"
-            findings.append(judge_deviation(name, gap, 0.02, 0.05))
+            fields = f"{_SHAPE_FIELDS}, C against cj_pressure"
+            findings.append(judge_deviation(name, gap, 0.02, 0.05, fields))
     ratio = pressure(isentrope, 1.0) / state.pressure
-    findings.append(judge_range("P_s(1) over P_CJ", ratio, (0.35, 0.50), (0.0, 1.0)))
+    fields = f"{_SHAPE_FIELDS} {against}"
+    findings.append(judge_range("P_s(1) over P_CJ", ratio, (0.35, 0.50), (0.0, 1.0), fields))
     return findings
 
 
@@ -120,18 +134,23 @@ def _jwl_energy(jwl: JwlSet, complete: CompleteJwl) -> list[Finding]:
     if jwl.total_energy is not None:
         implied = energy_behind(complete.isentrope, complete.cj) / jwl.total_energy - 1.0
         name = "Hugoniot (E_s(V_J) - P_J (1 - V_J)/2 against E0)"
-        findings.append(judge_deviation(name, implied, 0.02, 0.10))
+        against = "cj_pressure" if jwl.cj_pressure is not None else _stated_by(jwl)
+        fields = f"jwl.E0 against {against}"
+        findings.append(judge_deviation(name, implied, 0.02, 0.10, fields))
+    stated = ", E0" if jwl.total_energy is not None else ", C" if jwl.c is not None else ""
+    fields = f"{_SHAPE_FIELDS}{stated} against {_STATE_FIELDS}"
     own = own_cj_state(jwl, complete.total_energy)
     if own is None:
         limit = "a slowest Rayleigh line that reaches the Hugoniot"
-        return [*findings, judge_flag("CJ state of the equation of state", 0.0, limit, False)]
+        name = "CJ state of the equation of state"
+        return [*findings, judge_flag(name, 0.0, limit, False, "", fields)]
     state, velocity = own
     faster = velocity / jwl.detonation_velocity - 1.0
     higher = state.pressure / complete.cj.pressure - 1.0
     return [
         *findings,
-        judge_deviation("velocity of the own CJ state against D", faster, 0.01, 0.02),
-        judge_deviation("pressure of the own CJ state against P_CJ", higher, 0.02, 0.05),
+        judge_deviation("velocity of the own CJ state against D", faster, 0.01, 0.02, fields),
+        judge_deviation("pressure of the own CJ state against P_CJ", higher, 0.02, 0.05, fields),
     ]
 
 
@@ -144,8 +163,10 @@ def _shape(isentrope: ProductIsentrope, first_volume: float) -> list[Finding]:
     # Change of the chord slope over the slope: negative where the curve bends down.
     bend = float((np.diff(chord) / np.abs(chord[:-1])).min())
     return [
-        judge_flag("pressure positive", lowest, "> 0", lowest > 0.0, "Pa"),
-        judge_flag("convex pressure (smallest change of slope)", bend, "> 0", bend > 0.0),
+        judge_flag("pressure positive", lowest, "> 0", lowest > 0.0, "Pa", "jwl"),
+        judge_flag(
+            "convex pressure (smallest change of slope)", bend, "> 0", bend > 0.0, "", "jwl"
+        ),
     ]
 
 
@@ -158,12 +179,12 @@ def check_work(
     products adds 0.3 (ANFO) to 0.55 (emulsions) of it (derived by this project from the reaction
     balance), so that work beyond 1.55 of it cannot be.
     """
+    fields = "energy of the isentrope against heat_of_explosion"
     try:
         volume = volume_at_pressure(isentrope, AMBIENT_PRESSURE)
     except ValueError:
         limit = "the isentrope reaches 0.1 MPa"
-        return [judge_flag("work down to 0.1 MPa", math.nan, limit, False)]
+        return [judge_flag("work down to 0.1 MPa", math.nan, limit, False, "", fields)]
     share = (energy_per_mass - energy(isentrope, volume) / density) / heat
-    return [
-        judge_range("work down to 0.1 MPa over heat of explosion", share, (0.5, 1.2), (0.2, 1.55))
-    ]
+    name = "work down to 0.1 MPa over heat of explosion"
+    return [judge_range(name, share, (0.5, 1.2), (0.2, 1.55), fields)]

@@ -27,6 +27,8 @@ class Finding(NamedTuple):
     limit : str
         What is allowed, in words.
     level : Level
+    fields : str
+        Fields of an explosive file that the relation holds against each other.
     """
 
     relation: str
@@ -34,9 +36,11 @@ class Finding(NamedTuple):
     unit: str
     limit: str
     level: Level
+    fields: str = ""
 
     def __str__(self) -> str:
-        return f"{self.relation}: {self.shown_value}; allowed: {self.limit}"
+        line = f"{self.relation}: {self.shown_value}; allowed: {self.limit}"
+        return f"{line}; what does not fit: {self.fields}" if self.fields else line
 
     @property
     def shown_value(self) -> str:
@@ -56,12 +60,16 @@ def warned(findings: list[Finding]) -> list[Finding]:
     return [finding for finding in findings if finding.level is Level.WARN]
 
 
-def judge_flag(relation: str, value: float, limit: str, passed: bool, unit: str = "") -> Finding:
+def judge_flag(
+    relation: str, value: float, limit: str, passed: bool, unit: str = "", fields: str = ""
+) -> Finding:
     """Judge a relation that holds or not."""
-    return Finding(relation, value, unit, limit, Level.OK if passed else Level.REJECT)
+    return Finding(relation, value, unit, limit, Level.OK if passed else Level.REJECT, fields)
 
 
-def judge_deviation(relation: str, value: float, warn: float, reject: float | None) -> Finding:
+def judge_deviation(
+    relation: str, value: float, warn: float, reject: float | None, fields: str = ""
+) -> Finding:
     """Judge a relative deviation; `warn` and `reject` are shares."""
     off = abs(value)
     level = Level.OK if off <= warn else Level.WARN
@@ -70,15 +78,19 @@ def judge_deviation(relation: str, value: float, warn: float, reject: float | No
     limit = f"within {100 * warn:.3g} %"
     if reject is not None:
         limit += f" (rejected beyond {100 * reject:.3g} %)"
-    return Finding(relation, 100.0 * value, "%", limit, level)
+    return Finding(relation, 100.0 * value, "%", limit, level, fields)
 
 
 def judge_range(
-    relation: str, value: float, warn: tuple[float, float], reject: tuple[float, float]
+    relation: str,
+    value: float,
+    warn: tuple[float, float],
+    reject: tuple[float, float],
+    fields: str = "",
 ) -> Finding:
     """Judge a value against the range that is usual and the one beyond which it is rejected."""
     level = Level.OK if warn[0] <= value <= warn[1] else Level.WARN
     if not reject[0] <= value <= reject[1]:
         level = Level.REJECT
     limit = f"{warn[0]:g} to {warn[1]:g} (rejected outside {reject[0]:g} to {reject[1]:g})"
-    return Finding(relation, value, "", limit, level)
+    return Finding(relation, value, "", limit, level, fields)

@@ -6,12 +6,13 @@ file leaves out and the relations of the detonation give (C, E0, the CJ state) i
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from castblast.errors import SpecError, nearest_name
 from castblast.explosive.checks import check_jwl
@@ -33,6 +34,7 @@ from castblast.explosive.isentrope import (
     jwl_isentrope,
     tabulated_isentrope,
 )
+from castblast.explosive.remedies import remedies
 from castblast.explosive.table_checks import check_table
 from castblast.resources import resource
 from castblast.specs.loading import Spec, load_spec
@@ -77,6 +79,15 @@ class JwlSpec(Spec):
         Work to infinite expansion per initial volume.
     """
 
+    elsewhere: ClassVar[Mapping[str, str]] = {
+        "w": "omega",
+        "om": "omega",
+        "E": "E0",
+        "e0": "E0",
+        "R_1": "R1",
+        "R_2": "R2",
+    }
+
     A: Annotated[float, QuantityIn("Pa")]
     B: Annotated[float, QuantityIn("Pa")]
     C: Annotated[float, QuantityIn("Pa")] | None = None
@@ -119,11 +130,20 @@ class ExplosiveSpec(Spec):
     notes : str
     """
 
+    elsewhere: ClassVar[Mapping[str, str]] = {
+        **dict.fromkeys(("rho", "rho0", "ro"), "density"),
+        **dict.fromkeys(("D", "vod", "v_cj", "d_cj", "detonation_speed"), "detonation_velocity"),
+        **dict.fromkeys(("P_CJ", "pcj", "p_j", "cj"), "cj_pressure"),
+        **dict.fromkeys(("Q", "heat", "Q_v"), "heat_of_explosion"),
+    }
+
     name: Annotated[str, Field(min_length=1)]
     aliases: tuple[str, ...] = ()
     density: Annotated[float, QuantityIn("kg m-3", 200.0, 4000.0)]
     detonation_velocity: Annotated[float, QuantityIn("m s-1", 1000.0, 10000.0)]
-    heat_of_explosion: Annotated[float, QuantityIn("J kg-1", 1e5, 2e7)]
+    heat_of_explosion: Annotated[
+        float, QuantityIn("J kg-1", 1e5, 2e7, hint="1 MJ/kg is 1 kJ/g or 1e12 mJ/t")
+    ]
     cj_pressure: Annotated[float, QuantityIn("Pa", 1e8, 1e11)] | None = None
     jwl: JwlSpec | None = None
     isentrope: Annotated[tuple[tuple[float, ...], ...], BeforeValidator(_read_table)] | None = None
@@ -132,6 +152,24 @@ class ExplosiveSpec(Spec):
     source: Annotated[str, Field(min_length=1)]
     derived: tuple[str, ...] = ()
     notes: str = ""
+
+    @field_validator("jwl", mode="before")
+    @classmethod
+    def _energy_per_volume(cls, value: object, info: ValidationInfo) -> object:
+        """Offer the product where E0 is written per mass, as some hydrocodes take it."""
+        written = value.get("E0") if isinstance(value, Mapping) else None
+        density = info.data.get("density")
+        if density is None or not isinstance(written, str):
+            return value
+        try:
+            per_mass = convert(written, "J kg-1")
+        except QuantityError:
+            return value
+        message = (
+            f"E0: {written}: is an energy per mass; an energy per volume is needed: times the "
+            f"density of {density:g} kg/m3 it is {per_mass * density * 1e-9:.5g} GPa"
+        )
+        raise QuantityError(message)
 
     @model_validator(mode="after")
     def _one_isentrope(self) -> ExplosiveSpec:
@@ -183,6 +221,11 @@ class ExplosiveSpec(Spec):
             heat_of_explosion=self.heat_of_explosion,
             cj_pressure=self.cj_pressure,
         )
+
+    def remedies(self) -> list[str]:
+        """What would make rejected numbers fit, in words; a table has no such hints."""
+        jwl = self.jwl_set()
+        return [] if jwl is None else remedies(jwl, self.heat_of_explosion)
 
     def cj_state(self) -> CjState | None:
         """CJ state: as stated, or where the isentrope touches the Rayleigh line; None: nowhere."""

@@ -13,7 +13,7 @@ import types
 import typing
 from collections.abc import Hashable, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -25,7 +25,15 @@ _LONGEST_VALUE = 60
 
 
 class Spec(BaseModel):
-    """Base of all specs: frozen, no unknown keys, hashed by content."""
+    """Base of all specs: frozen, no unknown keys, hashed by content.
+
+    Attributes
+    ----------
+    elsewhere : mapping of str to str
+        What a field is called in other codes and books, for the hint to an unknown key.
+    """
+
+    elsewhere: ClassVar[Mapping[str, str]] = {}
 
     model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
 
@@ -198,8 +206,9 @@ def _describe(
         return "is missing"
     if kind == "extra_forbidden":
         names = _names_at(model, place[:-1])
-        hint = nearest_name(str(place[-1]), names) or f"; known keys: {', '.join(sorted(names))}"
-        return f"unknown key{hint}"
+        meant = _meant(str(place[-1]), _models_at(model, place[:-1]))
+        hint = f", did you mean '{meant}'?" if meant else nearest_name(str(place[-1]), names)
+        return "unknown key" + (hint or f"; known keys: {', '.join(sorted(names))}")
     if kind in ("literal_error", "enum"):
         expected = str(context.get("expected", ""))
         return f"allowed: {expected}"
@@ -212,8 +221,23 @@ def _describe(
     return message[:1].lower() + message[1:]
 
 
+def _meant(key: str, models: list[type[BaseModel]]) -> str:
+    """Field that a key is called elsewhere; empty: none."""
+    for model in models:
+        if issubclass(model, Spec):
+            for name, field in model.elsewhere.items():
+                if name.lower() == key.lower():
+                    return field
+    return ""
+
+
 def _names_at(model: Any, place: tuple[int | str, ...]) -> set[str]:
     """Field names of every model that the annotation at `place` allows."""
+    return {name for candidate in _models_at(model, place) for name in candidate.model_fields}
+
+
+def _models_at(model: Any, place: tuple[int | str, ...]) -> list[type[BaseModel]]:
+    """Every model that the annotation at `place` allows."""
     found = _models(model)
     for part in place:
         if isinstance(part, int) or not any(part in outer.model_fields for outer in found):
@@ -224,7 +248,7 @@ def _names_at(model: Any, place: tuple[int | str, ...]) -> set[str]:
             if part in outer.model_fields
             for inner in _models(outer.model_fields[part].annotation)
         ]
-    return {name for candidate in found for name in candidate.model_fields}
+    return found
 
 
 def _models(annotation: Any) -> list[type[BaseModel]]:

@@ -35,6 +35,7 @@ _UNITS = (
     "minute = 60 * second = min",
     "hour = 3600 * second = h",
     "liter = 1e-3 * meter ** 3 = L = l = litre",
+    "cubic_centimeter = 1e-6 * meter ** 3 = cc",
     "tonne = 1e6 * gram = t",
     "newton = 1000 * gram * meter / second ** 2 = N",
     "pascal = newton / meter ** 2 = Pa",
@@ -46,12 +47,22 @@ _UNITS = (
     "foot = 0.3048 * meter = ft",
     "pound = 453.59237 * gram = lb",
     "psi = 6894.757293168361 * pascal = psi",
+    "ksi = 6894757.293168361 * pascal = ksi",
+    "atmosphere = 101325 * pascal = atm",
+    "yard = 0.9144 * meter = yd",
+    "ounce = 28.349523125 * gram = oz",
+    "gallon = 3.785411784e-3 * meter ** 3 = gal",
+    "pound_force = 4.4482216152605 * newton = lbf",
+    "kilogram_force = 9.80665 * newton = kgf",
+    "erg = 1e-7 * joule = erg",
+    "btu = 1055.05585262 * joule = Btu = BTU",
 )
 #: Unit symbols offered when a unit is not known.
 UNIT_SYMBOLS = (
     "m", "mm", "cm", "km", "um", "in", "ft", "s", "ms", "us", "min", "h", "kg", "g", "t", "lb",
     "rad", "deg", "Pa", "kPa", "MPa", "GPa", "bar", "kbar", "psi", "N", "kN", "J", "kJ", "MJ",
-    "GJ", "cal", "kcal", "W", "kW", "L", "percent",
+    "GJ", "cal", "kcal", "W", "kW", "L", "percent", "cc", "Mbar", "ksi", "yd", "oz", "gal", "lbf",
+    "kgf", "atm", "erg", "Btu",
 )  # fmt: skip
 _DIMENSIONS = {
     "1": "a number without a unit",

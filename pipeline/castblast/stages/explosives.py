@@ -30,6 +30,8 @@ class CheckOutcome:
     rows : list of (relation, value, allowed, verdict)
     rejected : list of str
         One line per failed relation, with its value; empty: usable.
+    remedies : list of str
+        What would make rejected numbers fit.
     document : dict
         The same for machines.
     """
@@ -37,6 +39,7 @@ class CheckOutcome:
     title: str
     rows: list[tuple[str, str, str, str]]
     rejected: list[str]
+    remedies: list[str]
     document: dict[str, Any]
 
 
@@ -114,6 +117,7 @@ def check_explosive(name_or_path: str) -> CheckOutcome:
     spec = load_explosive(name_or_path)
     findings = spec.check()
     failed = [f"{spec.name}: {finding}" for finding in rejected(findings)]
+    mends = [f"{spec.name}: {line}" for line in spec.remedies()] if failed else []
     verdict = (
         "inconsistent" if failed else "usable, with warnings" if warned(findings) else "consistent"
     )
@@ -121,10 +125,12 @@ def check_explosive(name_or_path: str) -> CheckOutcome:
         title=f"{spec.name}: {verdict}",
         rows=[(f.relation, f.shown_value, f.limit, f.level.value) for f in findings],
         rejected=failed,
+        remedies=mends,
         document={
             "name": spec.name,
             "verdict": verdict,
             "findings": [{**f._asdict(), "level": f.level.value} for f in findings],
+            "remedies": mends,
         },
     )
 
@@ -141,6 +147,7 @@ def require_consistent(spec: ExplosiveSpec, *, allow_inconsistent: bool = False)
     failed = rejected(findings)
     if failed and not allow_inconsistent:
         lines = [f"{spec.name}: inconsistent explosive: {finding}" for finding in failed]
+        lines += [f"{spec.name}: {line}" for line in spec.remedies()]
         lines.append("mend the file, or run it as it is with --allow-inconsistent")
         raise CheckError("\n".join(lines))
     return [f"{spec.name}: {finding}" for finding in [*failed, *warned(findings)]]
