@@ -204,7 +204,9 @@ def test_velocity_of_each_hole_by_its_own_design(tmp_path: Path) -> None:
     assert first > second["burden_velocity"]
     assert plan.prediction["holes"] == 2
     holes_file(tmp_path, "-1,1,0,700", head="x [m],y [m],delay [ms],charge_mass [kg]")
-    with pytest.raises(SpecError, match=r"holes\.csv: line 2: charge_length .* does not fit"):
+    with pytest.raises(
+        SpecError, match=r"holes\.csv: line 2: charge_length .* leaves no room for stemming"
+    ):
         make_plan(spec, spec.bench.to_bench(), tmp_path)
 
 

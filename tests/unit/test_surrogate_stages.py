@@ -190,12 +190,12 @@ def test_prediction_from_quantities(network: Path) -> None:
 @pytest.mark.parametrize(
     ("values", "explosive", "message"),
     [
-        ({"burdn": 3.0}, "anfo", "burdn: no such input, did you mean 'burden'?"),
-        ({"ucs": 100.0}, "anfo", "ucs: 0.0001 MPa is implausible; allowed: 1 MPa to 600 MPa"),
-        ({"burden": 10.0, "bench_height": 5.0}, "anfo", "leaves no room for a charge"),
-        ({"charge_length": 20.0}, "anfo", "charge_length 20 m does not fit"),
+        ({"burdn": 3.0}, "anfo", "unknown input 'burdn', did you mean 'burden'?"),
+        ({"ucs": 100.0}, "anfo", "ucs 0.0001 MPa is not plausible: 1 MPa to 600 MPa"),
+        ({"burden": 10.0, "bench_height": 5.0}, "anfo", "leaves no room for a column charge"),
+        ({"charge_length": 20.0}, "anfo", "charge_length 20 m leaves no room for stemming"),
         ({}, "annfo", "did you mean 'anfo'?"),
-        ({"burden": float("nan")}, "anfo", "burden: nan m is implausible"),
+        ({"burden": float("nan")}, "anfo", "burden nan m is not plausible"),
     ],
 )
 def test_bad_designs_are_refused(network: Path, values, explosive: str, message: str) -> None:

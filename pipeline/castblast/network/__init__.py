@@ -13,6 +13,7 @@ from castblast.network.domain import (
     domain_faults,
     domain_violations,
     in_domain,
+    keeps_ranges_and_rules,
     offending_inputs,
     scale_columns,
 )
@@ -69,6 +70,7 @@ __all__ = [
     "evaluate_rows",
     "explosive_index",
     "in_domain",
+    "keeps_ranges_and_rules",
     "member_spread",
     "offending_inputs",
     "predict_rows",

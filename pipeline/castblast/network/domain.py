@@ -70,8 +70,8 @@ def density_reliefs(shell: Shell, numeric: Floats) -> Floats:
     return np.asarray(slopes**2 / np.sum(whitening**2, axis=1) / density.threshold)
 
 
-def in_domain(shell: Shell, numeric: Floats) -> NDArray[np.bool_]:
-    """Tell for each row of SI inputs (n, k) whether it lies in the domain; NaN does not."""
+def keeps_ranges_and_rules(shell: Shell, numeric: Floats) -> NDArray[np.bool_]:
+    """Tell for each row of SI inputs (n, k) whether ranges and rules hold; NaN breaks them."""
     lower = np.array([column.lower for column in shell.inputs])
     upper = np.array([column.upper for column in shell.inputs])
     inside: NDArray[np.bool_] = np.all((numeric >= lower) & (numeric <= upper), axis=1)
@@ -79,6 +79,12 @@ def in_domain(shell: Shell, numeric: Floats) -> NDArray[np.bool_]:
     for rule in shell.constraints:
         with np.errstate(invalid="ignore"):
             inside &= rule.margin(row) >= 0.0
+    return inside
+
+
+def in_domain(shell: Shell, numeric: Floats) -> NDArray[np.bool_]:
+    """Tell for each row of SI inputs (n, k) whether it lies in the domain; NaN does not."""
+    inside = keeps_ranges_and_rules(shell, numeric)
     if shell.density is not None:
         inside &= density_score(shell, numeric) <= 1.0
     return inside

@@ -6,31 +6,21 @@ Imports NumPy and light modules only, so that the command line answers in well u
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.errors import SpecError, nearest_name
+from castblast.design import require_possible
 from castblast.export.json_file import read_network
-from castblast.network import (
-    DomainViolation,
-    Floats,
-    Network,
-    RowPredictions,
-    domain_violations,
-    explosive_index,
-    member_spread,
-    predict_rows,
-)
+from castblast.network import Floats, Network, RowPredictions, explosive_index, member_spread
 from castblast.resources import resource
-from castblast.variables import INPUT_NAMES, STEMMING_RATIO, VARIABLES
+from castblast.stages.predict_columns import network_designs, predict_columns, row_violations
+from castblast.variables import VARIABLES
 
-#: Green, amber, red: in the domain; every value and rule kept but unusual together; beyond them.
-Domain = Literal["inside", "unusual", "outside"]
 #: Networks that come with castblast by the recipe of their dataset; the first is taken by default.
 SHIPPED_NETWORKS = {
     "full": "models/chosen/network.json",
@@ -92,14 +82,17 @@ def predict(
     Raises
     ------
     SpecError
-        Unknown names or explosive, values that are not plausible, no room for a charge.
+        Unknown names or explosive, and whatever `castblast.design` refuses; a charge that the
+        network cannot see.
     """
     model = network if isinstance(network, Network) else load_network(network)
-    inputs = complete_inputs(values, model)
-    violations = domain_violations(model, inputs) + _unused(values, inputs, model)
-    numeric = np.array([[inputs[name] for name in model.input_names]])
     index = np.array([explosive_index(model, explosive)], dtype=np.int64)
-    row = predict_rows(model, numeric, index)
+    answers = predict_columns(values, index, model)
+    require_possible(answers.designs.faults)
+    inputs = {name: float(column[0]) for name, column in answers.designs.inputs.items()}
+    numeric = np.array([list(inputs.values())])
+    violations = row_violations(answers, 0, model)
+    row = answers.rows
     outputs = dict(zip(model.output_names, row.values[0].tolist(), strict=True))
     score = float(row.score[0])
     return {
@@ -110,7 +103,7 @@ def predict(
         "display": {column.name: column.show(outputs[column.name]) for column in model.outputs},
         "inputs": inputs,
         "in_domain": not violations,
-        "domain": _verdict(violations),
+        "domain": str(answers.domain[0]),
         "out_of_domain": list(dict.fromkeys(n for v in violations for n in v.inputs)),
         "domain_faults": [violation.message for violation in violations],
         "domain_kinds": [violation.kind for violation in violations],
@@ -137,13 +130,6 @@ def _spread(model: Network, numeric: Floats, index: NDArray[np.int64]) -> dict[s
         return {}
     spread = member_spread(model, numeric, index)[0]
     return {"spread": dict(zip(model.output_names, spread.tolist(), strict=True))}
-
-
-def _verdict(violations: Sequence[DomainViolation]) -> Domain:
-    """Inside; unusual where only the joint density objects; else outside."""
-    if not violations:
-        return "inside"
-    return "unusual" if {violation.kind for violation in violations} == {"density"} else "outside"
 
 
 def predict_design(
@@ -187,84 +173,12 @@ def complete_inputs(values: Mapping[str, float], network: Network) -> dict[str, 
     Raises
     ------
     SpecError
-        All faults at once: unknown names, implausible values, no room for a charge.
+        All faults at once: unknown names, implausible values, impossible designs, or a charge
+        that the network cannot see.
     """
-    faults = [
-        f"{name}: no such input{nearest_name(name, INPUT_NAMES)}"
-        for name in values
-        if name not in INPUT_NAMES
-    ]
-    for name, value in values.items():
-        if name in INPUT_NAMES and not _plausible(name, value):
-            variable = VARIABLES[name]
-            allowed = f"{variable.show(variable.lower)} to {variable.show(variable.upper)}"
-            faults.append(f"{name}: {variable.show(value)} is implausible; allowed: {allowed}")
-    if faults:
-        raise SpecError("\n".join(faults))
-    full: dict[str, float] = {n: v.default for n, v in VARIABLES.items() if v.default is not None}
-    full.update({name: float(value) for name, value in values.items()})
-    if "charge_length" not in full:
-        full.setdefault("stemming_length", STEMMING_RATIO * full["burden"])
-        full["charge_length"] = full["bench_height"] - full["stemming_length"]
-    full.setdefault("stemming_length", full["bench_height"] - full["charge_length"])
-    full.setdefault("spacing", full["burden"])
-    full.setdefault("charge_diameter", full["hole_diameter"])
-    _require_room(full)
-    missing = [name for name in network.input_names if name not in full]
-    if missing:
-        raise SpecError("\n".join(f"{name}: must be given, it has no default" for name in missing))
-    return {name: full[name] for name in network.input_names}
-
-
-def _plausible(name: str, value: float) -> bool:
-    # The same rounding margin as for values with units: 60 deg must pass a bound of 60 deg.
-    variable = VARIABLES[name]
-    margin = 1e-12 * max(abs(variable.lower), abs(variable.upper))
-    return variable.lower - margin <= value <= variable.upper + margin
-
-
-def _require_room(full: Mapping[str, float]) -> None:
-    """Refuse a bench that cannot hold stemming and charge."""
-    shown = {n: VARIABLES[n].show(full[n]) for n in ("bench_height", "charge_length",
-                                                     "stemming_length")}  # fmt: skip
-    if full["charge_length"] < VARIABLES["charge_length"].lower:
-        message = (
-            f"bench_height {shown['bench_height']} leaves no room for a charge above a "
-            f"stemming_length of {shown['stemming_length']}"
-        )
-        raise SpecError(message)
-    if full["charge_length"] > full["bench_height"]:
-        message = (
-            f"charge_length {shown['charge_length']} does not fit a bench_height of "
-            f"{shown['bench_height']}"
-        )
-        raise SpecError(message)
-
-
-def _unused(
-    values: Mapping[str, float], inputs: Mapping[str, float], network: Network
-) -> list[DomainViolation]:
-    """Given inputs that the network cannot see and that differ from what it was trained at."""
-    violations = []
-    held = {n: v.default for n, v in VARIABLES.items() if v.default is not None}
-    held |= network.provenance.get("held_inputs", {})
-    tied = {"spacing": "burden", "charge_diameter": "hole_diameter"}
-    for name, value in values.items():
-        if name in inputs:
-            continue
-        if name == "stemming_length" and {"bench_height", "charge_length"} <= set(inputs):
-            expected: float | None = inputs["bench_height"] - inputs["charge_length"]
-        elif tied.get(name) in inputs:
-            expected = inputs[tied[name]]
-        else:
-            expected = held.get(name)
-        if expected is not None and math.isclose(value, expected, rel_tol=1e-9, abs_tol=1e-12):
-            continue
-        variable = VARIABLES[name]
-        trained = "" if expected is None else f", trained at {variable.show(expected)}"
-        message = f"{name} = {variable.show(value)}: has no effect in this network{trained}"
-        violations.append(DomainViolation((name,), message, "unseen"))
-    return violations
+    designs = network_designs(values, 1, network)
+    require_possible(designs.faults)
+    return {name: float(column[0]) for name, column in designs.inputs.items()}
 
 
 def _identity(network: Network) -> dict[str, Any]:
