@@ -10,7 +10,8 @@ from castblast.explosive.cj import JwlSet, complete_jwl, own_cj_state
 from castblast.explosive.finding import Finding, Level, rejected, warned
 from castblast.explosive.isentrope import pressure
 from castblast.explosive.table_checks import check_table
-from castblast.specs.explosive import explosive_names, load_explosive
+from castblast.specs.catalogue import explosive_names
+from castblast.specs.explosive import load_explosive
 
 GPA = 1e9
 

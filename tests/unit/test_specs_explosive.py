@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 import yaml
 
+from castblast.dataset.provenance import load_explosives
 from castblast.errors import CheckError, SpecError
 from castblast.explosive.isentrope import energy, in_hole_velocity, pressure
 from castblast.resources import resource
-from castblast.specs.explosive import explosive_names, load_explosive
+from castblast.specs.catalogue import explosive_names, resolve_explosive
+from castblast.specs.explosive import load_explosive
+from castblast.specs.recipe import load_recipe
 from castblast.stages.explosives import catalogue, check_explosive, describe, require_consistent
+from castblast.stages.predict import predict
+from castblast.stages.predict_table import predict_csv
 
 TNT = {
     "name": "tnt",
@@ -47,9 +53,39 @@ def test_the_catalogue_holds_the_four() -> None:
         assert sum(spec.composition.values()) == pytest.approx(1.0, abs=1e-9)
 
 
-@pytest.mark.parametrize(("alias", "name"), [("HANFO", "heavy_anfo"), ("Heavy ANFO", "heavy_anfo")])
-def test_aliases(alias: str, name: str) -> None:
-    assert load_explosive(alias).name == name
+@pytest.mark.parametrize(
+    ("written", "name"),
+    [
+        ("HANFO", "heavy_anfo"),
+        ("Heavy ANFO", "heavy_anfo"),
+        (" heavy-anfo ", "heavy_anfo"),
+        ("ANFO", "anfo"),
+        ("Surface  Emulsion", "gassed_emulsion"),
+    ],
+)
+def test_every_reader_knows_what_people_call_an_explosive(
+    written: str, name: str, tmp_path
+) -> None:
+    """The catalogue, predict, its tables, recipes and `explosive show` resolve a name alike."""
+    assert load_explosive(written).name == name
+    assert resolve_explosive(written) == name
+    assert predict({}, written)["explosive"] == name
+    table = tmp_path / "designs.csv"
+    table.write_text(f"explosive,burden [m]\n{written},3\n")
+    assert [row["explosive"] for row in predict_csv(table).rows] == [name]
+    assert describe(written)["name"] == name
+    text = resource("data_specs/recipes/quickstart.yaml").read_text(encoding="utf-8")
+    recipe = tmp_path / "recipe.yaml"
+    recipe.write_text(re.sub(r"explosives: .*", f"explosives: ['{written}']", text))
+    assert [entry.name for entry in load_explosives(load_recipe(recipe))] == [name]
+
+
+def test_a_name_stands_for_what_is_to_choose_from() -> None:
+    """A network names its explosives as its dataset did; nothing else answers in their place."""
+    assert resolve_explosive("my mix", ["My_Mix", "anfo"]) == "My_Mix"
+    assert resolve_explosive("emul", ["gassed_emulsion"]) == "gassed_emulsion"
+    assert resolve_explosive("emul", ["anfo"]) is None
+    assert resolve_explosive("", ["anfo"]) is None
 
 
 def test_in_hole_velocities_lie_in_the_measured_envelope() -> None:

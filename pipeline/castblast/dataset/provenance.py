@@ -20,7 +20,8 @@ from castblast import __version__
 from castblast.dataset.schema import SCHEMA, SCHEMA_VERSION
 from castblast.errors import SpecError
 from castblast.kernel import source_hash
-from castblast.specs.explosive import ExplosiveSpec, find_explosive
+from castblast.specs.catalogue import find_explosive
+from castblast.specs.explosive import ExplosiveSpec
 from castblast.specs.loading import make_spec, parse_yaml, read_text
 from castblast.specs.recipe import DESCRIPTIVE_KEYS, EXECUTION_KEYS, Recipe, RecipeSource
 from castblast.variables import VARIABLES

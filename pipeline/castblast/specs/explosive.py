@@ -7,14 +7,13 @@ file leaves out and the relations of the detonation give (C, E0, the CJ state) i
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
 from pathlib import Path
 from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
-from castblast.errors import SpecError, nearest_name
+from castblast.errors import SpecError
 from castblast.explosive.checks import check_jwl
 from castblast.explosive.cj import (
     CjState,
@@ -36,11 +35,9 @@ from castblast.explosive.isentrope import (
 )
 from castblast.explosive.remedies import remedies
 from castblast.explosive.table_checks import check_table
-from castblast.resources import resource
+from castblast.specs.catalogue import find_explosive
 from castblast.specs.loading import Spec, load_spec
 from castblast.specs.quantity import QuantityError, QuantityIn, convert
-
-_FOLDER = "data_specs/explosives"
 
 
 def _read_table(value: object) -> tuple[tuple[float, ...], ...]:
@@ -288,12 +285,6 @@ class ExplosiveSpec(Spec):
         raise SpecError(message)
 
 
-@cache
-def explosive_names() -> tuple[str, ...]:
-    """Names of the explosives in the catalogue, in alphabetical order."""
-    return tuple(sorted(path.stem for path in resource(_FOLDER).glob("*.yaml")))
-
-
 def load_explosive(name_or_path: str | Path) -> ExplosiveSpec:
     """Read an explosive of the catalogue, by name or alias, or a user's own file.
 
@@ -303,34 +294,3 @@ def load_explosive(name_or_path: str | Path) -> ExplosiveSpec:
         Unknown name (the nearest is named), or faults of the file.
     """
     return load_spec(find_explosive(name_or_path), ExplosiveSpec)
-
-
-def find_explosive(name_or_path: str | Path) -> Path:
-    """Path of the file of an explosive: of the catalogue, by name or alias, or a user's own.
-
-    Raises
-    ------
-    SpecError
-        Unknown name; the nearest is named.
-    """
-    text = str(name_or_path)
-    path = Path(text)
-    if path.suffix or path.parent != Path() or path.is_file():
-        return path
-    wanted = text.strip().lower().replace(" ", "_").replace("-", "_")
-    for name in explosive_names():
-        if wanted == name or wanted in _catalogue_entry(name).aliases:
-            return _catalogue_path(name)
-    known = ", ".join(explosive_names())
-    hint = nearest_name(wanted, explosive_names())
-    message = f"unknown explosive '{text}'{hint or ';'} known: {known}; or the path of a YAML file"
-    raise SpecError(message)
-
-
-def _catalogue_path(name: str) -> Path:
-    return resource(_FOLDER) / f"{name}.yaml"
-
-
-@cache
-def _catalogue_entry(name: str) -> ExplosiveSpec:
-    return load_spec(_catalogue_path(name), ExplosiveSpec)

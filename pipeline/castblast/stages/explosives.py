@@ -9,7 +9,8 @@ from castblast.errors import CheckError
 from castblast.explosive.cj import volume_at_pressure, work_to_pressure
 from castblast.explosive.finding import Finding, rejected, warned
 from castblast.explosive.isentrope import energy, in_hole_velocity, pressure, slope
-from castblast.specs.explosive import ExplosiveSpec, explosive_names, load_explosive
+from castblast.specs.catalogue import explosive_names
+from castblast.specs.explosive import ExplosiveSpec, load_explosive
 
 #: Pressures [Pa] down to which the work of the products is shown.
 WORK_PRESSURES = (1e8, 2e7, 1e5)

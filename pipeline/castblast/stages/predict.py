@@ -16,9 +16,14 @@ from numpy.typing import NDArray
 
 from castblast.design import require_possible
 from castblast.export.json_file import read_network
-from castblast.network import Floats, Network, RowPredictions, explosive_index, member_spread
+from castblast.network import Floats, Network, RowPredictions, member_spread
 from castblast.resources import resource
-from castblast.stages.predict_columns import network_designs, predict_columns, row_violations
+from castblast.stages.predict_columns import (
+    explosive_position,
+    network_designs,
+    predict_columns,
+    row_violations,
+)
 from castblast.variables import VARIABLES
 
 #: Networks that come with castblast by the recipe of their dataset; the first is taken by default.
@@ -68,6 +73,7 @@ def predict(
         What is missing takes the defaults of `castblast.variables`; the charge fills what the
         stemming leaves, 0.7 burden unless given.
     explosive : str
+        As people write it; see `castblast.specs.catalogue.resolve_explosive`.
     network : path or Network, optional
 
     Returns
@@ -86,7 +92,7 @@ def predict(
         network cannot see.
     """
     model = network if isinstance(network, Network) else load_network(network)
-    index = np.array([explosive_index(model, explosive)], dtype=np.int64)
+    index = np.array([explosive_position(model, explosive)], dtype=np.int64)
     answers = predict_columns(values, index, model)
     require_possible(answers.designs.faults)
     inputs = {name: float(column[0]) for name, column in answers.designs.inputs.items()}
@@ -96,7 +102,7 @@ def predict(
     outputs = dict(zip(model.output_names, row.values[0].tolist(), strict=True))
     score = float(row.score[0])
     return {
-        "explosive": explosive,
+        "explosive": model.explosives[index[0]],
         **outputs,
         "bands": _bands(model, row),
         **_spread(model, numeric, index),
@@ -148,7 +154,8 @@ def predict_design(
     score = document["density_score"]
     if score is not None and document["in_domain"]:
         remarks.append(f"inside the training data: density score {score:.2f}, the limit is 1")
-    return Prediction(document, f"{explosive}, {document['model']['name']}", rows, remarks)
+    title = f"{document['explosive']}, {document['model']['name']}"
+    return Prediction(document, title, rows, remarks)
 
 
 def _row(model: Network, name: str, document: Mapping[str, Any]) -> tuple[str, str, str, str]:

@@ -33,9 +33,11 @@ from castblast.network import (
     RowPredictions,
     Shell,
     domain_violations,
+    explosive_index,
     keeps_ranges_and_rules,
     predict_rows,
 )
+from castblast.specs.catalogue import resolve_explosive
 from castblast.variables import INPUT_NAMES, VARIABLES
 
 #: Inputs that share the hole: a network that cannot see how they do so answers for another charge.
@@ -139,6 +141,17 @@ def predict_columns(
         rows = RowPredictions(blank[0], blank[1], blank[2], score, rows.inside & ~refused)
         domain = np.where(refused, "outside", domain)
     return ColumnPredictions(designs, rows, refused, domain)
+
+
+def explosive_position(network: Shell, text: str) -> int:
+    """Position in a network of an explosive as people write it: ``ANFO``, ``Heavy ANFO``.
+
+    Raises
+    ------
+    SpecError
+        The network was not trained on it; the message lists those it knows.
+    """
+    return explosive_index(network, resolve_explosive(text, network.explosives) or text)
 
 
 def network_designs(values: InputColumns, count: int, network: Shell) -> NetworkDesigns:
