@@ -1,5 +1,7 @@
 """Compare, train, export and predict as stages: files in, the same files out every time."""
 
+import csv
+import io
 import json
 import subprocess
 import sys
@@ -138,7 +140,7 @@ def test_prediction_of_a_plain_design(network: Path) -> None:
     assert answer["inputs"]["charge_length"] == pytest.approx(12.0 - STEMMING_RATIO * 3.0)
     assert answer["inputs"]["ucs"] == 1e8
     assert answer["in_domain"]
-    band = answer["bands"]["burden_velocity"]
+    band = answer["network_band"]["burden_velocity"]
     assert band["lower"] < answer["burden_velocity"] < band["upper"]
     assert band["upper"] == pytest.approx(answer["burden_velocity"] * (1.0 + band["relative"]))
     assert answer["display"]["equilibrium_pressure"].endswith("MPa")
@@ -153,7 +155,7 @@ def test_prediction_is_near_the_formula_it_was_trained_on(network: Path) -> None
     answer = predict(design, "heavy_anfo", network)
     truth = 12 * (0.2 / 0.15) * 2.5**-0.8 * (13 / 15) ** 0.5 * 1.2
     truth *= 1 + 0.1 * np.tanh(2.5 / 3 - 1)
-    band = answer["bands"]["burden_velocity"]
+    band = answer["network_band"]["burden_velocity"]
     assert band["lower"] < truth < band["upper"]
 
 
@@ -213,6 +215,15 @@ def test_csv_of_designs(network: Path, tmp_path: Path) -> None:
     )
     lines = table.text.splitlines()
     assert len(lines) == 3
+    first = next(csv.DictReader(io.StringIO(table.text)))
+    band = table.rows[0]["prediction_band"]["burden_velocity"]
+    assert float(first["burden_velocity_prediction_lower [m s-1]"]) == pytest.approx(
+        band["lower"], rel=1e-3
+    )
+    band = table.rows[0]["prediction_band"]["equilibrium_pressure"]
+    assert float(first["equilibrium_pressure_prediction_upper [MPa]"]) == pytest.approx(
+        band["upper"] * 1e-6, rel=1e-3
+    )
     score = table.rows[0]["density_score"]
     assert lines[1].split(",")[-4:] == ["yes", "", "inside", f"{score:.4g}"]
     assert lines[2].split(",")[-4:-1] == ["no", "burden", "outside"]

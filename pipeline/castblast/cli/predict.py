@@ -36,10 +36,11 @@ def predict(
 ) -> Mapping[str, Any]:
     """Predict equilibrium pressure, hole expansion, crushed zone and burden velocity.
 
-    Inputs that are not given take their defaults. Every value comes with its 95 % band. A design
-    outside the training data, or unusual among them, is called so, and the inputs at fault are
-    named.
+    Inputs that are not given take their defaults. Every value comes with its prediction band, from
+    the 5th to the 95th percentile of blasts, a prior before calibration. A design outside training
+    data, or unusual among it, is called so, and the inputs at fault are named.
     """
+    from castblast.bands import BAND_TITLE
     from castblast.specs.case import split_assignments
     from castblast.stages.predict import predict_design
 
@@ -61,7 +62,7 @@ def predict(
     }
     given = {name: value for name, value in options.items() if value is not None}
     answer = predict_design({**given, **split_assignments(settings or [])}, explosive, network)
-    screen.table(("quantity", "value", "95 % band", "unit"), answer.rows, title=answer.title)
+    screen.table(("quantity", "value", BAND_TITLE, "unit"), answer.rows, title=answer.title)
     for line in answer.remarks:
         screen.note(line)
     return answer.document

@@ -39,7 +39,9 @@ class Answers(NamedTuple):
 
 def answers(network: Network, numeric: Floats, index: NDArray[np.int64]) -> Answers:
     """Answer rows with the network itself: what every copy is held against."""
-    return Answers(*predict_rows(network, numeric, index), offending_inputs(network, numeric))
+    row = predict_rows(network, numeric, index)
+    offending = offending_inputs(network, numeric)
+    return Answers(row.values, *row.network, row.score, row.inside, offending)
 
 
 def parse_answers(text: str, inputs: int) -> Answers:

@@ -27,8 +27,8 @@ def lookup_csv(network: Network) -> str:
     rows = _grid(network, axes)
     heads = [f"{c.name} [{_unit(c.name, c.unit)}]" for c in network.inputs]
     for c in network.outputs:
-        heads += [f"{name} [{_unit(c.name, c.unit)}]"
-                  for name in (c.name, f"{c.name}_lower", f"{c.name}_upper")]  # fmt: skip
+        heads += [f"{c.name}{part} [{_unit(c.name, c.unit)}]"
+                  for part in ("", "_prediction_lower", "_prediction_upper")]  # fmt: skip
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(["explosive", *heads, "domain"])
@@ -36,7 +36,7 @@ def lookup_csv(network: Network) -> str:
     factors = np.array([_factor(name) for name in network.output_names])
     for kind, explosive in enumerate(network.explosives):
         found = predict_rows(network, rows, np.full(len(rows), kind, dtype=np.int64))
-        parts = np.stack([found.values, found.lower, found.upper], axis=2) * factors[:, None]
+        parts = np.stack([found.values, *found.prediction], axis=2) * factors[:, None]
         for row, answer, inside in zip(rows * shown, parts, found.inside, strict=True):
             numbers = [f"{value:.6g}" for value in (*row, *answer.ravel())]
             writer.writerow([explosive, *numbers, "inside" if inside else "unusual"])

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from castblast.bands import prediction_factor
 from castblast.errors import SpecError, nearest_name
 from castblast.network.domain import density_score, in_domain, scale_columns
 from castblast.network.record import Layer, Network, Shell
@@ -30,13 +31,24 @@ _ACTIVATIONS: dict[str, Callable[[Floats], Floats]] = {
 }
 
 
+class Bounds(NamedTuple):
+    """Ends of a band of n rows, (n, m) [SI]."""
+
+    lower: Floats
+    upper: Floats
+
+
 class RowPredictions(NamedTuple):
     """Answers for n rows.
 
     Attributes
     ----------
-    values, lower, upper : (n, m) [SI]
-        Prediction and ends of its 95 % band, meant for rows inside the domain.
+    values : (n, m) [SI]
+    prediction : Bounds
+        Where the blast is expected, see `castblast.bands`; NaN for outputs without a prior.
+    network : Bounds
+        Where the physics model is expected: the 95 % band of the network. Both bands are meant for
+        rows inside the domain.
     score : (n,)
         Joint density score, at most 1 inside; NaN if the network has none.
     inside : (n,) bool
@@ -44,8 +56,8 @@ class RowPredictions(NamedTuple):
     """
 
     values: Floats
-    lower: Floats
-    upper: Floats
+    prediction: Bounds
+    network: Bounds
     score: Floats
     inside: NDArray[np.bool_]
 
@@ -138,13 +150,41 @@ def member_spread(network: Network, numeric: Floats, index: NDArray[np.int64]) -
 
 
 def predict_rows(network: Network, numeric: Floats, index: NDArray[np.int64]) -> RowPredictions:
-    """Evaluate rows of SI inputs with their band and domain; parameters as `evaluate_rows`."""
+    """Evaluate rows of SI inputs with bands and domain; parameters as `evaluate_rows`."""
     values = evaluate_rows(network, numeric, index)
-    half = np.abs(values) * np.array([column.relative_band for column in network.outputs])
+    return RowPredictions(
+        values,
+        prediction_bounds(network, values),
+        network_bounds(network, values),
+        density_score(network, numeric),
+        in_domain(network, numeric),
+    )
+
+
+def network_bounds(shell: Shell, values: Floats) -> Bounds:
+    """Ends of the 95 % bands of a network about its outputs (n, m) in SI."""
+    half = np.abs(values) * np.array([column.relative_band for column in shell.outputs])
     with np.errstate(invalid="ignore"):
-        lower, upper = values - half, values + half
-    score = density_score(network, numeric)
-    return RowPredictions(values, lower, upper, score, in_domain(network, numeric))
+        return Bounds(values - half, values + half)
+
+
+def prediction_bounds(shell: Shell, values: Floats) -> Bounds:
+    """Ends of the prediction bands about outputs (n, m) in SI, the error of the network included.
+
+    NaN for outputs without a prior; values below zero have their ends in order.
+    """
+    less, more = (np.array(factors) for factors in zip(*prediction_factors(shell), strict=True))
+    with np.errstate(over="ignore", invalid="ignore"):
+        lower, upper = values * less, values * more
+        if (values < 0.0).any():
+            lower, upper = np.minimum(lower, upper), np.maximum(lower, upper)
+    return Bounds(lower, upper)
+
+
+def prediction_factors(shell: Shell) -> list[tuple[float, float]]:
+    """Ends of the prediction band over the value, for each output of a network."""
+    factors = [prediction_factor(c.name, c.relative_band) for c in shell.outputs]
+    return [(1.0 / factor, factor) for factor in factors]
 
 
 def evaluate(

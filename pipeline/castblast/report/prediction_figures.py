@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from castblast.bands import BAND_TITLE
 from castblast.report.style import CYCLE, in_style, new_figure, save_figure
 
 
@@ -19,8 +20,8 @@ class VelocityCurve:
     Attributes
     ----------
     label : str
-    burden, velocity, band : array (n,) [m, m s-1, m s-1]
-        Answers of the surrogate and the half-widths of their 95 % bands.
+    burden, velocity, lower, upper : array (n,) [m, m s-1, m s-1, m s-1]
+        Answers of the surrogate and the ends of their prediction bands.
     simulated_burden, simulated_velocity : array (k,) [m, m s-1]
         The physics at a few burdens.
     """
@@ -28,24 +29,27 @@ class VelocityCurve:
     label: str
     burden: NDArray[np.float64]
     velocity: NDArray[np.float64]
-    band: NDArray[np.float64]
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
     simulated_burden: NDArray[np.float64]
     simulated_velocity: NDArray[np.float64]
 
 
 @in_style
 def draw_velocity_curves(path: Path, title: str, curves: Sequence[VelocityCurve]) -> Path:
-    """Draw lines with bands for the surrogate and dots for the physics; logarithmic axes."""
+    """Draw lines with prediction bands for the surrogate and dots for the physics."""
     figure, axis = new_figure(width=7.0, height=4.0)
     for curve, colour in zip(curves, CYCLE, strict=False):
-        low, high = curve.velocity - curve.band, curve.velocity + curve.band
-        axis.fill_between(curve.burden, low, high, color=colour, alpha=0.2, linewidth=0)
+        axis.fill_between(
+            curve.burden, curve.lower, curve.upper, color=colour, alpha=0.15, linewidth=0
+        )
         axis.plot(curve.burden, curve.velocity, color=colour, label=curve.label)
         axis.plot(curve.simulated_burden, curve.simulated_velocity, "o", color=colour, markersize=4)
     axis.set_yscale("log")
     axis.yaxis.set_major_formatter("{x:g}")
     axis.yaxis.set_minor_formatter("{x:g}")
     axis.plot([], [], "o", color="#222222", markersize=4, label="physics")
+    axis.fill_between([], [], [], color="#222222", alpha=0.15, linewidth=0, label=BAND_TITLE)
     axis.set(title=title, xlabel="burden [m]", ylabel="burden velocity [m/s]")
     axis.legend()
     return save_figure(figure, path)

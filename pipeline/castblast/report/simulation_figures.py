@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from castblast.bands import BAND_TITLE, BASIS, prediction_band, show_band, show_value
 from castblast.report.style import (
     BLUE,
     GREEN,
@@ -75,11 +76,12 @@ def draw_simulation(
     figure, axes = new_figure(2, 2, width=9.0, height=5.8)
     _draw_pressure(axes[0, 0], document, near)
     _draw_hole(axes[0, 1], document, near)
-    _draw_burden(axes[1, 0], burden)
+    _draw_burden(axes[1, 0], document, burden)
     _draw_ledger(axes[1, 1], document)
     figure.suptitle(
         f"{document['explosive']}: {document['equilibrium_pressure'] * 1e-6:.0f} MPa at rest, "
-        f"burden velocity {document['burden_velocity']:.1f} m/s",
+        f"burden velocity {show_value('burden_velocity', document['burden_velocity'])} m/s "
+        f"({show_band('burden_velocity', document['burden_velocity'])}, {BASIS})",
         fontsize=11,
     )
     return save_figure(figure, path)
@@ -102,9 +104,12 @@ def _draw_hole(axis: Any, document: Mapping[str, Any], near: NearFieldHistory) -
     axis.set(title="Hole radius", xlabel="time [ms]", ylabel="radius [mm]")
 
 
-def _draw_burden(axis: Any, burden: BurdenHistory) -> None:
+def _draw_burden(axis: Any, document: Mapping[str, Any], burden: BurdenHistory) -> None:
     time = burden.history_time * 1e3
     axis.plot(time, burden.history_velocity, color=BLUE, label="velocity")
+    ends = prediction_band("burden_velocity", document["burden_velocity"])
+    last = float(time[-1])
+    axis.plot([last, last], ends, "_-", color=BLUE, linewidth=1.0, label=BAND_TITLE)
     axis.set(title="Burden motion", xlabel="time [ms]", ylabel="velocity [m/s]")
     other = axis.twinx()
     other.grid(visible=False)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from castblast.bands import BASIS, prediction_factor, show_band, show_value
 from castblast.blast import make_case, result_values, run_blast
 from castblast.files import write_text
 from castblast.network import evaluate
@@ -29,12 +30,14 @@ def compare_with_physics(network: Path, out: Path, progress: ProgressCallback) -
     predicted = predict({}, EXPLOSIVE, network)
     progress(0.0, "simulating the default design")
     simulated = simulate(explosive=EXPLOSIVE, values={}, out=out).document
-    names = list(predicted["bands"])
+    names = list(predicted["network_band"])
     document = {
         "explosive": EXPLOSIVE,
         "inputs": predicted["inputs"],
         "predicted": {name: predicted[name] for name in names},
-        "bands": predicted["bands"],
+        "prediction_band": predicted["prediction_band"],
+        "prediction_basis": predicted["prediction_basis"],
+        "network_band": predicted["network_band"],
         "simulated": {name: simulated[name] for name in names},
     }
     curves = []
@@ -43,15 +46,15 @@ def compare_with_physics(network: Path, out: Path, progress: ProgressCallback) -
         curves.append(_velocity_curve(network, diameter))
     draw_velocity_curves(
         out / "velocity.png",
-        "Surrogate (lines, 95 % bands) and physics (dots), ANFO, other inputs at defaults",
+        "Surrogate (lines) and physics (dots), ANFO, other inputs at defaults",
         curves,
     )
     write_text(out / "comparison.json", json.dumps(document, indent=2) + "\n")
-    ratio = predicted["burden_velocity"] / simulated["burden_velocity"] - 1.0
-    return [
-        f"burden velocity {predicted['burden_velocity']:.2f} m/s predicted, "
-        f"{simulated['burden_velocity']:.2f} m/s simulated ({ratio:+.2%})"
-    ]
+    speed = {"predicted": predicted["burden_velocity"], "simulated": simulated["burden_velocity"]}
+    ratio = speed["predicted"] / speed["simulated"] - 1.0
+    shown = [f"{show_value('burden_velocity', v)} m/s {word}" for word, v in speed.items()]
+    band = show_band("burden_velocity", speed["simulated"])
+    return [f"burden velocity {', '.join(shown)} ({ratio:+.2%}); {band} m/s, {BASIS}"]
 
 
 def _velocity_curve(path: Path, diameter: float) -> VelocityCurve:
@@ -61,6 +64,7 @@ def _velocity_curve(path: Path, diameter: float) -> VelocityCurve:
     columns = {name: np.array([design[name] for design in designs]) for name in designs[0]}
     velocity = evaluate(network, columns, EXPLOSIVE)["burden_velocity"]
     band = next(c.relative_band for c in network.outputs if c.name == "burden_velocity")
+    factor = prediction_factor("burden_velocity", band)
     explosive = load_explosive(EXPLOSIVE).to_explosive()
     simulated = [
         result_values(run_blast(make_case(explosive, {"burden": b, "hole_diameter": diameter})))
@@ -70,7 +74,8 @@ def _velocity_curve(path: Path, diameter: float) -> VelocityCurve:
         f"{diameter * 1e3:.0f} mm hole",
         burden,
         velocity,
-        band * velocity,
+        velocity / factor,
+        velocity * factor,
         BURDENS,
         np.array([values["burden_velocity"] for values in simulated]),
     )

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from castblast import __version__
+from castblast.bands import BAND_TITLE, BAND_WORDS, show_band, show_value
 from castblast.report.html import Picture, Section, Table, write_report
 from castblast.stages.dataset import describe_dataset
 from castblast.stages.muckpile_results import metric_rows
@@ -20,14 +21,14 @@ _LEAD = (
 LEFT_OUT = (
     "Fracturing between equilibrium and burden motion is not simulated; gas storage in radial "
     "cracks stands for it.",
-    "The burden model is calibrated, not validated: its parameters were chosen so that burden "
-    "velocities have the level of the published system. 30 % on velocity is an honest uncertainty "
-    "before a calibration in the field.",
+    "The burden model was checked against the published system, whose level its parameters were "
+    "chosen to give; it is neither calibrated on your blasts nor validated. The prediction band, a "
+    "factor 1.8 either way on velocity, is a prior.",
     "Rock strength does not depend on the loading rate (a factor is offered as calibration).",
     "More energetic explosives are not credited with more heave than ANFO: in rate-independent "
     "rock they spend the difference on crushing.",
-    "The bands belong to the surrogate: they say how well it repeats the physics model, not how "
-    "well the model repeats a blast.",
+    "The network band says how well the surrogate repeats the physics model, not how well the "
+    "model repeats a blast; that is the prediction band.",
     "Fragments are balls with rolling resistance; their sizes are prescribed, not predicted.",
     "The demo's dataset and muckpile are small: see the recipes paper and full, and the benches, "
     "for the real sizes.",
@@ -106,21 +107,26 @@ def _prediction(folder: Path) -> Section:
     rows = []
     for name, predicted in document["predicted"].items():
         variable, simulated = VARIABLES[name], document["simulated"][name]
-        band = document["bands"][name]["relative"]
+        band = document["network_band"][name]["relative"]
         rows.append(
             (
                 name.replace("_", " "),
-                variable.show(predicted),
+                f"{show_value(name, predicted)} {variable.shown_unit}",
+                f"{show_band(name, predicted, band)} {variable.shown_unit}",
+                f"{show_value(name, simulated)} {variable.shown_unit}",
                 f"± {band:.1%}",
-                variable.show(simulated),
                 f"{predicted / simulated - 1.0:+.2%}",
             )
         )
     inputs = ", ".join(f"{n} {VARIABLES[n].show(v)}" for n, v in document["inputs"].items())
     return Section(
         "Prediction against physics",
-        paragraphs=[f"Design: {document['explosive']}, {inputs}."],
-        tables=[Table(("quantity", "surrogate", "95 % band", "physics", "deviation"), rows)],
+        paragraphs=[f"Design: {document['explosive']}, {inputs}.", f"{BAND_WORDS}."],
+        tables=[
+            Table(
+                ("quantity", "surrogate", BAND_TITLE, "physics", "network band", "deviation"), rows
+            )
+        ],
         pictures=[
             Picture(folder / "velocity.png", "Burden velocity over burden"),
             Picture(folder / "simulation.png", "The simulated blast"),

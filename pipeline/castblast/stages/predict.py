@@ -1,4 +1,4 @@
-"""Answer at once from the chosen network: values, 95 % bands, and what lies outside its domain.
+"""Answer at once from the chosen network: values, bands, and what lies outside its domain.
 
 Imports NumPy and light modules only, so that the command line answers in well under a second.
 """
@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from castblast.bands import BAND_WORDS, band_document, show_band, show_value
 from castblast.design import require_possible
 from castblast.export.json_file import read_network
 from castblast.network import Floats, Network, RowPredictions, member_spread
@@ -79,8 +80,10 @@ def predict(
     Returns
     -------
     dict
-        Every output by name [SI]; ``bands`` (lower, upper and relative half-width per output),
-        ``spread`` of the members if there are any, ``display``, ``inputs`` used. Then
+        Every output by name [SI]; ``prediction_band`` (lower and upper end per output) and
+        ``prediction_basis``, see `castblast.bands`; ``network_band`` (lower, upper and relative
+        half-width of the 95 % band of the network alone), ``spread`` of its members if there are
+        any, ``display``, ``inputs`` used. Then
         ``in_domain``; ``domain``: inside, unusual (only the joint density objects) or outside;
         ``out_of_domain`` (names), ``domain_faults`` and ``domain_kinds`` (one each);
         ``density_score``, at most 1 inside, None where the network has none.
@@ -104,7 +107,8 @@ def predict(
     return {
         "explosive": model.explosives[index[0]],
         **outputs,
-        "bands": _bands(model, row),
+        **band_document(outputs, {c.name: c.relative_band for c in model.outputs}),
+        "network_band": _network_band(model, row),
         **_spread(model, numeric, index),
         "display": {column.name: column.show(outputs[column.name]) for column in model.outputs},
         "inputs": inputs,
@@ -118,12 +122,12 @@ def predict(
     }
 
 
-def _bands(model: Network, row: RowPredictions) -> dict[str, dict[str, float]]:
-    """Ends of the 95 % bands of one row."""
+def _network_band(model: Network, row: RowPredictions) -> dict[str, dict[str, float]]:
+    """Ends of the 95 % bands of the network about one row."""
     return {
         column.name: {
-            "lower": float(row.lower[0, j]),
-            "upper": float(row.upper[0, j]),
+            "lower": float(row.network.lower[0, j]),
+            "upper": float(row.network.upper[0, j]),
             "relative": column.relative_band,
         }
         for j, column in enumerate(model.outputs)
@@ -148,7 +152,7 @@ def predict_design(
     document = predict(parse_values(values, "predict"), explosive, model)
     rows = [_row(model, name, document) for name in model.output_names]
     shown = ", ".join(f"{c.name} {c.show(document['inputs'][c.name])}" for c in model.inputs)
-    remarks = [f"inputs: {shown}"]
+    remarks = [f"inputs: {shown}", BAND_WORDS]
     lead = "unusual among" if document["domain"] == "unusual" else "outside"
     remarks += [f"{lead} the training data: {line}" for line in document["domain_faults"]]
     score = document["density_score"]
@@ -160,18 +164,13 @@ def predict_design(
 
 def _row(model: Network, name: str, document: Mapping[str, Any]) -> tuple[str, str, str, str]:
     column = model.outputs[model.output_names.index(name)]
-    variable = VARIABLES[name]
-    band = document["bands"][name]
-    low, high = (band[side] * variable.display_factor for side in ("lower", "upper"))
-    value = document[name] * variable.display_factor
-    # One figure more than the band resolves.
-    digits = max(3, min(6, 1 - math.floor(math.log10(max(column.relative_band, 1e-6))) + 1))
-    low_high = f"{low:.{digits}g} to {high:.{digits}g}"
+    low_high = show_band(name, document[name], column.relative_band)
     if document["domain"] == "outside":
         low_high = "unknown: outside the training data"
     elif document["domain"] == "unusual":
         low_high += " (unusual design)"
-    return (name.replace("_", " "), f"{value:.{digits}g}", low_high, variable.shown_unit)
+    value = show_value(name, document[name])
+    return (name.replace("_", " "), value, low_high, VARIABLES[name].shown_unit)
 
 
 def complete_inputs(values: Mapping[str, float], network: Network) -> dict[str, float]:

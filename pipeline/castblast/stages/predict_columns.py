@@ -27,6 +27,7 @@ from castblast.design import (
     require_none,
 )
 from castblast.network import (
+    Bounds,
     DomainViolation,
     Floats,
     Network,
@@ -88,7 +89,7 @@ class ColumnPredictions(NamedTuple):
     ----------
     designs : NetworkDesigns
     rows : RowPredictions
-        Outputs, network bands, density score; NaN in refused rows.
+        Outputs, bands, density score; NaN in refused rows.
     refused : (n,) bool
         Rows that are no possible design, or none for this network; see `designs.faults`.
     domain : (n,) str
@@ -135,10 +136,7 @@ def predict_columns(
         outside |= entry.rows
     domain = np.where(outside, "outside", np.where(rows.inside, "inside", "unusual"))
     if refused.any():
-        values_of = (rows.values, rows.lower, rows.upper)
-        blank = [np.where(refused[:, None], np.nan, part) for part in values_of]
-        score = np.where(refused, np.nan, rows.score)
-        rows = RowPredictions(blank[0], blank[1], blank[2], score, rows.inside & ~refused)
+        rows = _without(rows, refused)
         domain = np.where(refused, "outside", domain)
     return ColumnPredictions(designs, rows, refused, domain)
 
@@ -152,6 +150,21 @@ def explosive_position(network: Shell, text: str) -> int:
         The network was not trained on it; the message lists those it knows.
     """
     return explosive_index(network, resolve_explosive(text, network.explosives) or text)
+
+
+def _without(rows: RowPredictions, refused: NDArray[np.bool_]) -> RowPredictions:
+    """Answers with NaN in every number of the refused rows."""
+
+    def blank(part: Floats) -> Floats:
+        return np.where(refused[:, None], np.nan, part)
+
+    return RowPredictions(
+        blank(rows.values),
+        Bounds(*map(blank, rows.prediction)),
+        Bounds(*map(blank, rows.network)),
+        np.where(refused, np.nan, rows.score),
+        rows.inside & ~refused,
+    )
 
 
 def network_designs(values: InputColumns, count: int, network: Shell) -> NetworkDesigns:

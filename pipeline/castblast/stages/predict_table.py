@@ -120,7 +120,11 @@ def _csv_text(documents: Sequence[Mapping[str, Any]], model: Network) -> str:
     """Designs and answers in display units, one a line."""
     columns = (*model.inputs, *model.outputs)
     heads = [f"{c.name} [{VARIABLES[c.name].shown_unit}]" for c in columns]
-    bands = [f"{c.name} 95 % band [%]" for c in model.outputs]
+    bands = [
+        f"{c.name}_prediction_{end} [{VARIABLES[c.name].shown_unit}]"
+        for c in model.outputs
+        for end in ("lower", "upper")
+    ]
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(["explosive", *heads, *bands, "in_domain", "out_of_domain", "domain",
@@ -128,10 +132,18 @@ def _csv_text(documents: Sequence[Mapping[str, Any]], model: Network) -> str:
     for document in documents:
         values = {**document["inputs"], **document}
         cells = [f"{values[c.name] * VARIABLES[c.name].display_factor:.8g}" for c in columns]
-        half = [f"{100.0 * c.relative_band:.3g}" for c in model.outputs]
+        ends = [
+            _shown_end(document, c.name, end) for c in model.outputs for end in ("lower", "upper")
+        ]
         inside = "yes" if document["in_domain"] else "no"
         outside = " ".join(document["out_of_domain"])
         score = "" if document["density_score"] is None else f"{document['density_score']:.4g}"
         verdict = [inside, outside, document["domain"], score]
-        writer.writerow([document["explosive"], *cells, *half, *verdict])
+        writer.writerow([document["explosive"], *cells, *ends, *verdict])
     return buffer.getvalue()
+
+
+def _shown_end(document: Mapping[str, Any], name: str, end: str) -> str:
+    """End of a prediction band in the usual unit; empty where none is stated."""
+    band = document["prediction_band"].get(name)
+    return "" if band is None else f"{band[end] * VARIABLES[name].display_factor:.4g}"

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from castblast.bands import BAND_WORDS, band_document, show_band, show_value
 from castblast.blast import BlastResult, BlastSettings, make_case, result_values, run_blast
 from castblast.errors import SimulationError, Status
 from castblast.extras import require
@@ -25,7 +26,7 @@ class SimulationOutcome:
 
     document: dict[str, Any]
     title: str
-    rows: list[tuple[str, str, str]]
+    rows: list[tuple[str, str, str, str]]
     remarks: list[str] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)
 
@@ -86,6 +87,7 @@ def simulate(
         remarks.append("the hole wall was still moving at the end (settled: false)")
     if inputs["charge_diameter"] < inputs["hole_diameter"]:
         remarks.append("decoupled charge: the work of the gas on the air gap is neglected")
+    remarks.append(BAND_WORDS)
     files = [] if out is None else _write(out, document, result)
     title = f"{spec.name}, {mode} mode, {parameter_set} parameters"
     return SimulationOutcome(document, title, _rows(document), remarks, files)
@@ -106,18 +108,19 @@ def _document(
         "parameter_set": parameter_set,
         "status": Status(result.status).name.lower(),
         **outputs,
+        **band_document(result_values(result)),
         "inputs": dict(inputs),
     }
 
 
-def _rows(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+def _rows(document: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
     rows = []
     for name, value in document.items():
         variable = VARIABLES.get(name)
         if variable is None or isinstance(value, bool):
             continue
-        shown = value * variable.display_factor
-        rows.append((name.replace("_", " "), f"{shown:.6g}", variable.shown_unit))
+        words, unit = name.replace("_", " "), variable.shown_unit
+        rows.append((words, show_value(name, value), show_band(name, value), unit))
     return rows
 
 
