@@ -146,9 +146,12 @@ def test_balls_from_csv(tmp_path: Path) -> None:
     ("change", "line"),
     [
         (("2.1,0.5", "nan,0.5"), "line 3: y: nan: a number is needed"),
-        (("2.1,0.5", "1.8,0.5"), "balls 0 and 1 by 40 % (ball 0 is that of line 2)"),
-        (("radius", "r"), "column 'r': unknown column"),
-        (("0.5,0.5,1", "0.5,-0.5,1"), "first ball 1: -0.5 m"),
+        (("2.1,0.5", "1.8,0.5"), "balls 0 (line 2) and 1 (line 3) by 40 %"),
+        (("radius", "rho"), "column 'rho': unknown column"),
+        (
+            ("0.5,0.5,1", "0.5,-0.5,1"),
+            "line 3: radius: -0.5 m: implausible (-0.5 m); allowed: 0.001 to 18 m",
+        ),
         (("vy,", "v_y,"), "unknown column, did you mean 'vy'?"),
         (("1,2,3", "1,2,"), "line 3: vz: empty: a number is needed"),
         (("2.1,0.5", "2.1 0.5"), "line 3: 6 cells for 7 heads"),

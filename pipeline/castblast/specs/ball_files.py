@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -12,11 +13,29 @@ from castblast.errors import SpecError, nearest_name
 from castblast.muckpile.contact import ContactLaw
 from castblast.muckpile.initial_state import initial_state
 from castblast.muckpile.particles import FloatArray, Particles
-from castblast.specs.table import read_table
+from castblast.specs.balls import RADII
+from castblast.specs.quantity import QuantityIn
+from castblast.specs.table import Form, Table, read_table
 
 _KEYS = ("x", "r")
 _PLACE, _MOTION = ("x", "y", "z"), ("vx", "vy", "vz")
-_UNITS = dict.fromkeys((*_PLACE, "radius"), "m") | dict.fromkeys(_MOTION, "m s-1") | {"block": "1"}
+_NO_RADIUS = "the column 'radius' is missing"
+_MOST_PAIRS = 20
+_FORM = Form(
+    columns={
+        **dict.fromkeys(_PLACE, QuantityIn("m", -1e5, 1e5)),
+        "radius": QuantityIn("m", *RADII),
+        "diameter": QuantityIn("m", 2.0 * RADII[0], 2.0 * RADII[1]),
+        **dict.fromkeys(_MOTION, QuantityIn("m s-1", -500.0, 500.0)),
+        "block": QuantityIn("1", -1.0, 1e7),
+    },
+    required=_PLACE,
+    # As ParaView writes the points of a file.
+    aliases={"r": "radius", "points_0": "x", "points_1": "y", "points_2": "z"},
+    ids=("id", "particle_id"),
+    unique_ids=True,
+    bare=True,
+)
 
 
 def read_balls(path: Path, law: ContactLaw | None = None) -> Particles:
@@ -65,27 +84,57 @@ def read_balls(path: Path, law: ContactLaw | None = None) -> Particles:
 
 
 def _read_csv(path: Path, law: ContactLaw | None) -> Particles:
-    table = read_table(path, _UNITS, (*_PLACE, "radius"), bare=True)
+    table = read_table(path, _FORM)
     number = table.number
     given = [name for name in _MOTION if name in number]
     faults = [f"{path}: the column '{n}' is missing" for n in _MOTION if given and n not in given]
-    for name in (*given, *(["block"] if "block" in number else [])):
+    sizes = [name for name in ("radius", "diameter") if name in number]
+    if len(sizes) != 1:
+        word = "only one of 'radius' and 'diameter' is needed" if sizes else _NO_RADIUS
+        faults.append(f"{path}: {word}")
+    for name in (*sizes, *given, *(["block"] if "block" in number else [])):
         bad = table.line[~np.isfinite(number[name])]
         faults += [f"{path}: line {line}: {name}: empty: a number is needed" for line in bad[:5]]
     if faults:
         raise SpecError("\n".join(faults))
     block = number.get("block")
+    radius = number["radius"] if sizes == ["radius"] else 0.5 * number["diameter"]
+    place = _columns(number, _PLACE)
+    _require_single(table, place)
     balls, faults = initial_state(
-        _columns(number, _PLACE),
-        number["radius"],
+        place,
+        radius,
         velocity=_columns(number, _MOTION) if given else None,
         block=None if block is None else block.astype(np.int64),
         law=law,
     )
     if faults:
-        first = f"ball 0 is that of line {table.line[0]}"
-        raise SpecError("\n".join(f"{path}: {fault} ({first})" for fault in faults))
+        raise SpecError("\n".join(f"{path}: {_with_lines(fault, table)}" for fault in faults))
     return balls
+
+
+def _require_single(table: Table, place: FloatArray) -> None:
+    """Refuse balls that stand in the table twice."""
+    order = np.lexsort(place.T)
+    same = np.flatnonzero((np.diff(place[order], axis=0) == 0.0).all(axis=1))
+    if len(same):
+        pairs = sorted(sorted((int(order[k]), int(order[k + 1]))) for k in same)[:_MOST_PAIRS]
+        raise SpecError(
+            "\n".join(
+                f"{table.path}: lines {table.line[one]} and {table.line[two]}: two balls at one "
+                f"place"
+                for one, two in pairs
+            )
+        )
+
+
+def _with_lines(fault: str, table: Table) -> str:
+    """Name the line of each ball that a fault names by its number."""
+
+    def named(match: re.Match[str]) -> str:
+        return f"{match[1]}{match[2]} (line {table.line[int(match[2])]})"
+
+    return re.sub(r"(\bballs? |\band (?=\d+ by))(\d+)", named, fault)
 
 
 def _columns(columns: dict[str, Any], names: tuple[str, ...]) -> FloatArray:

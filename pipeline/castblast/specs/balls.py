@@ -24,6 +24,10 @@ from castblast.specs.quantity import QuantityError, QuantityIn
 #: With more the smallest of a normal distribution would have no size.
 _WIDEST_NORMAL = 0.4
 _ROUNDS = 6
+_MEAN_RADII = (0.005, 10.0)
+_WIDEST = 0.8
+#: Radii [m] that a bench file can bring about, and a file of balls may hold.
+RADII = (_MEAN_RADII[0] * (1.0 - _WIDEST), _MEAN_RADII[1] * (1.0 + _WIDEST))
 
 
 class BallsSpec(Spec):
@@ -46,11 +50,11 @@ class BallsSpec(Spec):
     solid_fraction : float [-]
     """
 
-    mean_radius: Annotated[float, QuantityIn("m", 0.005, 10.0)] | None = None
+    mean_radius: Annotated[float, QuantityIn("m", *_MEAN_RADII)] | None = None
     count: Annotated[int, Field(ge=10, le=5_000_000)] | None = None
     file: Annotated[str, Field(min_length=1)] | None = None
     distribution: Literal["uniform", "normal"] = "uniform"
-    relative_deviation: Annotated[float, QuantityIn("1", 0.0, 0.8)] = 0.5
+    relative_deviation: Annotated[float, QuantityIn("1", 0.0, _WIDEST)] = 0.5
     fragments: FragmentsSpec | None = None
     solid_fraction: Annotated[float, QuantityIn("1", 0.55, 0.63)] = 0.60
 

@@ -11,23 +11,37 @@ from castblast.errors import SpecError
 from castblast.muckpile.bench import Bench, assign_blocks, bench_outline, block_centres
 from castblast.muckpile.outline import depth_inside
 from castblast.muckpile.particles import FloatArray, IntArray
-from castblast.specs.quantity import QuantityError, convert_variable
-from castblast.specs.table import Table, read_table
-from castblast.variables import INPUT_NAMES, VARIABLES
+from castblast.specs.firing import THROW_AZIMUTH, THROW_ELEVATION
+from castblast.specs.quantity import QuantityIn, VariableIn
+from castblast.specs.table import ID_HEADS, Form, Table, read_table
+from castblast.variables import INPUT_NAMES
 
-_UNITS = {
-    "x": "m",
-    "y": "m",
-    "delay": "s",
-    "velocity": "m s-1",
-    "direction": "rad",
-    "elevation": "rad",
-    "charge_mass": "kg",
-}
 _FROM_BENCH = ("bench_height", "face_angle")
-_LARGEST = {"velocity": 100.0, "delay": 60.0}
 #: Two holes closer than this share of burden and spacing are one, where balls go to the nearest.
 _TOO_CLOSE = 0.25
+_FORM = Form(
+    columns={
+        "x": "m",
+        "y": "m",
+        "delay": QuantityIn("s", 0.0, 60.0),
+        "velocity": QuantityIn("m s-1", 0.0, 100.0),
+        "direction": THROW_AZIMUTH,
+        "elevation": THROW_ELEVATION,
+        "charge_mass": QuantityIn("kg", above=0.0, upper=1e5),
+        **{name: VariableIn(name) for name in INPUT_NAMES if name not in _FROM_BENCH},
+    },
+    required=("x", "y", "delay"),
+    texts=("explosive",),
+    aliases={
+        "firing_time": "delay",
+        "diameter": "hole_diameter",
+        "explosive_mass": "charge_mass",
+        "charge_weight": "charge_mass",
+        "stemming": "stemming_length",
+    },
+    ids=ID_HEADS,
+    unique_ids=True,
+)
 
 
 class Holes(NamedTuple):
@@ -45,7 +59,9 @@ class Holes(NamedTuple):
         Explosive and variables in SI units in which a hole differs from the design of the bench
         file; ``charge_mass`` [kg] besides.
     where : list of str
-        File and line of each hole, for messages.
+        File and line of each hole, and its id if it has one, for messages.
+    label : list of str
+        Ids of the holes; empty where the file has none.
     """
 
     place: FloatArray
@@ -55,6 +71,7 @@ class Holes(NamedTuple):
     elevation: FloatArray
     design: list[dict[str, Any]]
     where: list[str]
+    label: list[str]
 
 
 def read_holes(path: Path, bench: Bench, *, by_block: bool) -> Holes:
@@ -76,10 +93,9 @@ def read_holes(path: Path, bench: Bench, *, by_block: bool) -> Holes:
     SpecError
         One line per fault, with file and line.
     """
-    inputs = {name: VARIABLES[name].unit for name in INPUT_NAMES if name not in _FROM_BENCH}
-    table = read_table(path, _UNITS | inputs, ("x", "y", "delay"), ("explosive",))
+    table = read_table(path, _FORM)
     place = np.column_stack([table.number["x"], table.number["y"]])
-    faults = _value_faults(table) + _place_faults(table, place, bench)
+    faults = _place_faults(table, place, bench)
     faults += _shared_blocks(table, place, bench) if by_block else _close(table, place, bench)
     if faults:
         raise SpecError("\n".join(faults))
@@ -92,7 +108,8 @@ def read_holes(path: Path, bench: Bench, *, by_block: bool) -> Holes:
         number.get("direction", nothing),
         number.get("elevation", nothing),
         _designs(table),
-        [f"{path}: line {line}" for line in table.line],
+        [table.where(k) for k in range(len(table.line))],
+        table.label,
     )
 
 
@@ -116,34 +133,13 @@ def _level(place: FloatArray) -> FloatArray:
     return np.column_stack([place, np.zeros(len(place))])
 
 
-def _value_faults(table: Table) -> list[str]:
-    faults = []
-    for name, largest in _LARGEST.items():
-        for line, value in zip(table.line, table.number.get(name, ()), strict=False):
-            if value < 0.0 or value > largest:
-                faults.append(
-                    f"{table.path}: line {line}: {name}: {value:g} {_UNITS[name]}: implausible; "
-                    f"allowed: 0 to {largest:g} {_UNITS[name]}"
-                )
-    for name in table.number:
-        if name not in INPUT_NAMES:
-            continue
-        for line, value in zip(table.line, table.number[name], strict=True):
-            try:
-                if np.isfinite(value):
-                    convert_variable(name, f"{float(value)!r} {VARIABLES[name].unit}")
-            except QuantityError as fault:
-                faults.append(f"{table.path}: line {line}: {name}: {fault}")
-    return faults
-
-
 def _place_faults(table: Table, place: FloatArray, bench: Bench) -> list[str]:
     outside = depth_inside(bench_outline(bench), _level(place)) < -1e-9
     return [
-        f"{table.path}: line {table.line[k]}: the hole at x = {place[k, 0]:g} m, y = "
+        f"{table.where(k)}: the hole at x = {place[k, 0]:g} m, y = "
         f"{place[k, 1]:g} m stands outside the bench, {-bench.width:g} to 0 m in x and 0 to "
         f"{bench.length:g} m in y"
-        for k in np.flatnonzero(outside)
+        for k in np.flatnonzero(outside).tolist()
     ]
 
 
@@ -153,7 +149,7 @@ def _shared_blocks(table: Table, place: FloatArray, bench: Bench) -> list[str]:
     for k, block in enumerate(assign_blocks(_level(place), bench).tolist()):
         if block in first:
             faults.append(
-                f"{table.path}: lines {table.line[first[block]]} and {table.line[k]}: two holes "
+                f"{_pair(table, first[block], k)}: two holes "
                 f"on block {block}, {bench.burden:g} x {bench.spacing:g} m; set 'firing.blocks: "
                 f"nearest_hole' for holes off the grid"
             )
@@ -166,10 +162,16 @@ def _close(table: Table, place: FloatArray, bench: Bench) -> list[str]:
 
     reach = _TOO_CLOSE * min(bench.burden, bench.spacing)
     return [
-        f"{table.path}: lines {table.line[i]} and {table.line[j]}: two holes on one block, "
+        f"{_pair(table, i, j)}: two holes on one block, "
         f"{np.linalg.norm(place[i] - place[j]):.2g} m apart; at least {reach:g} m is needed"
         for i, j in sorted(cKDTree(place).query_pairs(reach))
     ]
+
+
+def _pair(table: Table, one: int, other: int) -> str:
+    """File and lines of two holes, and their ids."""
+    lines = f"{table.path}: lines {table.line[one]} and {table.line[other]}"
+    return f"{lines} ({table.label[one]}, {table.label[other]})" if table.label else lines
 
 
 def _designs(table: Table) -> list[dict[str, Any]]:

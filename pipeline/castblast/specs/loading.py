@@ -91,7 +91,7 @@ def read_text(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except FileNotFoundError:
-        raise SpecError(f"{path}: no such file{_nearest_file(path)}") from None
+        raise SpecError(f"{path}: no such file{nearest_file(path)}") from None
     except IsADirectoryError:
         raise SpecError(f"{path}: is a folder; a YAML file is needed") from None
     except UnicodeDecodeError:
@@ -153,7 +153,8 @@ def make_spec(
         raise SpecError("\n".join(lines)) from None
 
 
-def _nearest_file(path: Path) -> str:
+def nearest_file(path: Path) -> str:
+    """Return a hint at the file of that folder whose name is nearest, or an empty string."""
     try:
         names = [entry.name for entry in path.parent.iterdir() if entry.suffix == path.suffix]
     except OSError:

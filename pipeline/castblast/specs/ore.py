@@ -18,10 +18,16 @@ from castblast.errors import SpecError
 from castblast.muckpile.bench import Bench
 from castblast.muckpile.ore import OrePolygon
 from castblast.specs.loading import Spec, load_spec, make_spec
-from castblast.specs.table import read_table
+from castblast.specs.quantity import QuantityIn
+from castblast.specs.table import Form, read_table
 
-#: Grades are numbers in whatever unit the user thinks in.
-_COLUMNS = {"x": "m", "y": "m", "grade": "1"}
+#: Grades are numbers in whatever unit the user thinks in, and as large as they like.
+_FORM = Form(
+    columns={"x": "m", "y": "m", "grade": QuantityIn("1", lower=0.0)},
+    required=("name", "x", "y"),
+    texts=("name",),
+    bare=True,
+)
 # Polygons drawn side by side share corners that were rounded to a centimetre.
 _OVERLAP = 0.01
 
@@ -85,7 +91,7 @@ def _without_closing_corner(corners: Any) -> Any:
 
 def _from_csv(path: Path) -> dict[str, Any]:
     """Gather the lines of each name, in order of appearance."""
-    table = read_table(path, _COLUMNS, ("name", "x", "y"), ("name",), bare=True)
+    table = read_table(path, _FORM)
     grades = table.number.get("grade", np.full(len(table.line), math.nan))
     found: dict[str, dict[str, Any]] = {}
     faults = []
@@ -96,8 +102,7 @@ def _from_csv(path: Path) -> dict[str, Any]:
         if math.isnan(grade):
             continue
         if entry["grade"] not in (None, grade):
-            line = table.line[k]
-            faults.append(f"{path}: line {line}: grade: '{name}' has another grade above")
+            faults.append(f"{table.where(k)}: grade: '{name}' has another grade above")
         entry["grade"] = grade
     if faults:
         raise SpecError("\n".join(faults))

@@ -10,6 +10,9 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 from castblast.errors import SpecError, nearest_name
 from castblast.specs.units import QuantityError, convert
 from castblast.variables import VARIABLES, Variable
@@ -38,18 +41,13 @@ def convert_variable(name: str, value: object) -> float:
     QuantityError
         What is wrong and what is allowed.
     """
-    variable = VARIABLES[name]
-    number = convert(value, variable.unit)
-    if not _within(number, variable.lower, variable.upper):
-        shown = variable.show(number)
-        message = f"implausible ({shown}); allowed: {allowed(variable)}"
-        raise QuantityError(message)
-    return number
+    return VariableIn(name).check(convert(value, VARIABLES[name].unit))
 
 
-def _within(number: float, lower: float, upper: float) -> bool:
-    """Compare with a rounding margin: 60 deg must pass a bound of 60 deg."""
-    return lower - 1e-12 * abs(lower) <= number <= upper + 1e-12 * abs(upper)
+def _within(numbers: ArrayLike, lower: float, upper: float) -> NDArray[np.bool_]:
+    """Compare with a rounding margin: 60 deg must pass a bound of 60 deg; NaN does not pass."""
+    values = np.asarray(numbers, dtype=np.float64)
+    return (lower - 1e-12 * abs(lower) <= values) & (values <= upper + 1e-12 * abs(upper))
 
 
 def allowed(variable: Variable) -> str:
@@ -135,6 +133,10 @@ class QuantityIn:
             return number
         raise QuantityError(message + (f"; {self.hint}" if self.hint else ""))
 
+    def within(self, numbers: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Which of many numbers in `unit` are allowed; NaN is not."""
+        return (numbers > self.above) & _within(numbers, self.lower, self.upper)
+
     def _show(self, number: float) -> str:
         """Write a value with its unit; angles in degrees."""
         if self.unit == "rad":
@@ -161,9 +163,27 @@ class VariableIn:
 
     name: str
 
+    @property
+    def unit(self) -> str:
+        """SI unit of the variable."""
+        return VARIABLES[self.name].unit
+
     def parse(self, value: object) -> float:
         """Read one value; a ValueError says what is wrong."""
         return convert_variable(self.name, value)
+
+    def check(self, number: float) -> float:
+        """Hold a value [SI] against the bounds; a ValueError says what is allowed."""
+        variable = VARIABLES[self.name]
+        if _within(number, variable.lower, variable.upper):
+            return number
+        message = f"implausible ({variable.show(number)}); allowed: {allowed(variable)}"
+        raise QuantityError(message)
+
+    def within(self, numbers: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Which of many numbers [SI] are plausible; NaN is not."""
+        variable = VARIABLES[self.name]
+        return _within(numbers, variable.lower, variable.upper)
 
     def __get_pydantic_core_schema__(
         self, source: object, handler: GetCoreSchemaHandler

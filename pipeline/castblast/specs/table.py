@@ -1,29 +1,37 @@
-"""CSV files of people: heads with units, such as ``delay [ms]``, numbers in SI, faults by line."""
+"""The one reader of tables: heads with units, numbers in SI within their bounds, faults by line.
+
+Everything that comes as rows of cells goes through `read_table`: holes, balls, ground, ore, rows of
+a dataset, designs to predict. What a table may look like is said in ``data_specs/README.md``.
+"""
 
 from __future__ import annotations
 
-import csv
-import io
-import math
-import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.errors import SpecError, nearest_name
-from castblast.specs.loading import read_text
-from castblast.specs.quantity import QuantityError, convert
+from castblast.errors import SpecError
+from castblast.specs.quantity import QuantityError
+from castblast.specs.table_cells import Faults, NumberColumn, shown
+from castblast.specs.table_heads import Form, Head, Rows, read_heads, with_unit_row
+from castblast.specs.table_text import open_sheet
+from castblast.specs.units import scaled, unit_factor
 
-_HEAD = re.compile(r"\s*([\w/ ]*?\w)\s*(?:\[([^\]]*)\])?\s*")
-_MOST_FAULTS = 20
+__all__ = ["ID_HEADS", "Form", "Table", "read_table"]
+
+#: Heads of a column that names the rows.
+ID_HEADS = ("id", "name", "label", "hole", "hole_id", "hole_name", "hole_no", "hole_number")
+_CHUNK = 20_000
+_LONGEST_ID = 200
 
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of a CSV file.
+    """Columns of a table of n rows.
 
     Attributes
     ----------
@@ -33,130 +41,201 @@ class Table:
     number : dict of str to array (n,)
         In SI units; NaN where an optional cell is empty.
     text : dict of str to list of str
+    unit : dict of str to str
+        Unit that the head of a column of numbers gives; empty: none.
+    label : list of str
+        Ids of the rows as the file gives them; empty without a column of ids.
+    label_head : str
+        Head of that column.
     """
 
     path: Path
     line: NDArray[np.int64]
     number: dict[str, NDArray[np.float64]]
     text: dict[str, list[str]]
+    unit: dict[str, str] = field(default_factory=dict)
+    label: list[str] = field(default_factory=list)
+    label_head: str = ""
+
+    def place(self, row: int) -> str:
+        """Line of a row, and its id where it has one, for messages: ``line 5 (hole 'H4')``."""
+        label = self.label[row] if self.label else ""
+        return _place(int(self.line[row]), self.label_head, label)
+
+    def where(self, row: int) -> str:
+        """File and place of a row."""
+        return f"{self.path}: {self.place(row)}"
 
 
-def read_table(
-    path: Path,
-    units: Mapping[str, str],
-    required: Sequence[str],
-    texts: Sequence[str] = (),
-    *,
-    bare: bool = False,
-) -> Table:
-    """Read a CSV file.
+def read_table(path: Path, form: Form) -> Table:
+    """Read a table.
 
     Parameters
     ----------
     path : Path
-    units : mapping of column name to SI unit
-    required : sequence of str
-        Columns that must be there, without empty cells.
-    texts : sequence of str
-        Columns of words.
-    bare : bool
-        A head without a unit is in SI; otherwise it is refused.
+        Text in UTF-8, UTF-16 or Windows-1252; cells apart by ``,``, ``;``, tabs or blanks; decimal
+        commas where something else separates the cells; units in brackets behind the heads, in a
+        row below them, or behind each number; remarks behind ``#``.
+    form : Form
 
     Raises
     ------
     SpecError
         One line per fault, with file, line and column; the first twenty.
     """
-    lines = _split_lines(path)
-    (head_line, heads), rows = lines[0], lines[1:]
-    names, factors = _read_heads(path, head_line, heads, units, texts, bare=bare)
-    faults = [f"{path}: the column '{name}' is missing" for name in required if name not in names]
-    if faults:
-        raise SpecError("\n".join(faults))
-    if not rows:
-        raise SpecError(f"{path}: holds heads only; at least one row is needed")
-    for line, cells in rows:
-        if len(cells) != len(names):
-            faults.append(f"{path}: line {line}: {len(cells)} cells for {len(names)} heads")
-    if faults:
-        raise SpecError("\n".join(_first(faults)))
-    number, text = {}, {}
-    for k, name in enumerate(names):
-        cells_of = [cells[k].strip() for _, cells in rows]
-        if name in texts:
-            text[name] = cells_of
-            continue
-        column = np.array([_to_number(cell) for cell in cells_of])
-        number[name] = column * factors[k]
-        bad = np.flatnonzero(~np.isfinite(column))
-        faults += [
-            f"{path}: line {rows[i][0]}: {name}: {cells_of[i] or 'empty'}: a number is needed"
-            for i in bad[: _MOST_FAULTS + 1]
-            if cells_of[i] or name in required
-        ]
-    if faults:
-        raise SpecError("\n".join(_first(faults)))
-    return Table(path, np.array([line for line, _ in rows]), number, text)
+    sheet = open_sheet(path)
+    heads, rows = read_heads(path, sheet, form)
+    rows = with_unit_row(path, form, heads, rows)
+    faults = Faults()
+    cells = _Cells(path, form, heads, comma=sheet.separator != ",")
+    for chunk in _chunks(rows):
+        cells.add(chunk, faults)
+    cells.add_column_faults(faults)
+    table = cells.table()
+    _value_faults(table, form, faults)
+    if form.unique_ids:
+        _label_faults(table, faults)
+    if faults.count:
+        raise SpecError("\n".join(faults.messages()))
+    return table
 
 
-def _split_lines(path: Path) -> list[tuple[int, list[str]]]:
-    """Line numbers and cells of lines that are neither empty nor a remark behind ``#``."""
-    reader = csv.reader(io.StringIO(read_text(path).removeprefix("\ufeff")))
-    try:
-        lines = [
-            (reader.line_num, cells)
-            for cells in reader
-            if any(cell.strip() for cell in cells) and not cells[0].lstrip().startswith("#")
-        ]
-    except csv.Error as fault:
-        raise SpecError(f"{path}: line {reader.line_num}: is no CSV: {fault}") from None
-    if not lines:
-        raise SpecError(f"{path}: is empty")
-    return lines
+class _Cells:
+    """Cells below the heads, taken up a chunk of rows at a time."""
 
+    def __init__(self, path: Path, form: Form, heads: list[Head], *, comma: bool) -> None:
+        self.path, self.form, self.heads = path, form, heads
+        self.lines: list[int] = []
+        self.numbers = {
+            k: NumberColumn(form.unit(head.name), bool(head.unit), comma)
+            for k, head in enumerate(heads)
+            if head.kind == "number"
+        }
+        self.words: dict[int, list[str]] = {
+            k: [] for k, head in enumerate(heads) if head.kind in ("text", "label")
+        }
+        self.label = next((k for k, head in enumerate(heads) if head.kind == "label"), None)
 
-def _read_heads(
-    path: Path,
-    line: int,
-    heads: Sequence[str],
-    units: Mapping[str, str],
-    texts: Sequence[str],
-    *,
-    bare: bool,
-) -> tuple[list[str], list[float]]:
-    """Names and SI factors of the columns."""
-    names: list[str] = []
-    factors, faults = [], []
-    for head in heads:
-        match = _HEAD.fullmatch(head)
-        name, written = (match[1], (match[2] or "").strip()) if match else (head.strip(), "")
-        where = f"{path}: line {line}: column '{head.strip()}'"
-        factor = 1.0
-        if name in names:
-            faults.append(f"{where}: given twice")
-        elif name not in units and name not in texts:
-            hint = nearest_name(name, (*units, *texts))
-            known = ", ".join((*units, *texts)[:12])
-            faults.append(f"{where}: unknown column{hint or '; known: ' + known}")
-        elif name in units and not (bare and not written):
+    def add(self, chunk: list[tuple[int, list[str]]], faults: Faults) -> None:
+        """Take up rows; what is no number, or has no head, is a fault."""
+        lines, cells = _same_width(self.path, len(self.heads), chunk, faults)
+        if not lines:
+            return
+        first = len(self.lines)
+        self.lines += lines
+        for k in self.words:
+            self.words[k] += [cell.strip() for cell in cells[k]]
+        for k, column in self.numbers.items():
+            name = self.heads[k].name
+            for row, cell, wrong in column.read(cells[k], name in self.form.required):
+                place = f"{self.path}: {self.place(first + row)}: {name}: {shown(cell)}"
+                faults.add(lines[row], f"{place}: {wrong}")
+        for k in (k for k, head in enumerate(self.heads) if head.kind == "blank"):
+            for line, cell in zip(lines, cells[k], strict=True):
+                if cell.strip():
+                    faults.add(line, f"{self.path}: line {line}: '{shown(cell)}' has no head")
+
+    def place(self, row: int) -> str:
+        """Line of a row, and its id if it has one."""
+        label = "" if self.label is None else self.words[self.label][row]
+        return _place(self.lines[row], self.label_head(), label)
+
+    def label_head(self) -> str:
+        """Head of the column of ids."""
+        return "" if self.label is None else self.heads[self.label].name or "row"
+
+    def add_column_faults(self, faults: Faults) -> None:
+        """Say where units are missing, and where both decimal signs are used."""
+        points = any(column.points for column in self.numbers.values())
+        for k, column in self.numbers.items():
+            head = self.heads[k]
+            for row, cell in column.commas if points else ():
+                faults.add(
+                    self.lines[row],
+                    f"{self.path}: {self.place(row)}: {head.name}: {shown(cell)}: a comma in a "
+                    f"file with decimal points; write numbers without thousands separators",
+                )
+            if head.unit or self.form.bare or column.unit == "1" or not column.plain:
+                continue
             try:
-                factor = convert(f"1 {written}", units[name])
+                unit_factor("", column.unit)
             except QuantityError as fault:
-                faults.append(f"{where}: {fault}")
-        names.append(name)
-        factors.append(factor)
-    if faults:
-        raise SpecError("\n".join(_first(faults)))
-    return names, factors
+                faults.add(0, f"{self.path}: column '{head.raw.strip()}': {fault}")
+
+    def table(self) -> Table:
+        """All of it, in SI."""
+        heads = self.heads
+        return Table(
+            self.path,
+            np.array(self.lines, dtype=np.int64),
+            {heads[k].name: scaled(c.values(), heads[k].factor) for k, c in self.numbers.items()},
+            {heads[k].name: w for k, w in self.words.items() if heads[k].kind == "text"},
+            {heads[k].name: heads[k].unit for k in self.numbers},
+            [] if self.label is None else self.words[self.label],
+            self.label_head(),
+        )
 
 
-def _to_number(cell: str) -> float:
-    try:
-        return float(cell)
-    except ValueError:
-        return math.nan
+def _place(line: int, head: str, label: str) -> str:
+    return f"line {line} ({head} '{shown(label)}')" if label else f"line {line}"
 
 
-def _first(faults: list[str]) -> list[str]:
-    more = len(faults) - _MOST_FAULTS
-    return faults if more <= 0 else [*faults[:_MOST_FAULTS], f"... and {more} more"]
+def _chunks(rows: Rows) -> Iterator[list[tuple[int, list[str]]]]:
+    while chunk := list(itertools.islice(rows, _CHUNK)):
+        yield chunk
+
+
+def _same_width(
+    path: Path, width: int, chunk: list[tuple[int, list[str]]], faults: Faults
+) -> tuple[list[int], list[tuple[str, ...]]]:
+    """Lines and columns of the rows that have a cell for every head; blank ends do not count."""
+    lines, rows = [], []
+    for line, cells in chunk:
+        if len(cells) > width and not "".join(cells[width:]).strip():
+            cells = cells[:width]
+        if len(cells) == width:
+            lines.append(line)
+            rows.append(cells)
+            continue
+        hint = ""
+        if len(cells) > width and len(cells) % width == 0:
+            hint = "; decimal commas need ';' or tabs between the cells"
+        faults.add(line, f"{path}: line {line}: {len(cells)} cells for {width} heads{hint}")
+    return lines, list(zip(*rows, strict=True))
+
+
+def _value_faults(table: Table, form: Form, faults: Faults) -> None:
+    """Hold all columns against their bounds, as the fields of YAML files are."""
+    for name, values in table.number.items():
+        rule = form.columns[name]
+        if isinstance(rule, str):
+            continue
+        bad = np.flatnonzero(~rule.within(values) & ~np.isnan(values))
+        for row in bad.tolist():
+            value, unit = float(values[row]), table.unit[name] or rule.unit
+            written = (
+                value / unit_factor(table.unit[name], rule.unit) if table.unit[name] else value
+            )
+            shown_value = f"{written:.6g} {'' if unit == '1' else unit}".strip()
+            try:
+                rule.check(value)
+            except QuantityError as fault:
+                line = f"{table.where(row)}: {name}: {shown_value}: {fault}"
+                faults.add(int(table.line[row]), line)
+
+
+def _label_faults(table: Table, faults: Faults) -> None:
+    """Say which ids are missing or given twice."""
+    first: dict[str, int] = {}
+    for row, label in enumerate(table.label):
+        line, head = int(table.line[row]), table.label_head
+        if not label or len(label) > _LONGEST_ID:
+            wrong = "empty" if not label else f"longer than {_LONGEST_ID} characters"
+            faults.add(line, f"{table.path}: line {line}: {head}: {wrong}")
+        elif label in first:
+            above = table.line[first[label]]
+            faults.add(
+                line,
+                f"{table.path}: lines {above} and {line}: {head} '{shown(label)}': given twice",
+            )
+        first.setdefault(label, row)

@@ -12,7 +12,10 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
-from typing import Any
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from castblast.errors import nearest_name
 
@@ -209,12 +212,23 @@ def convert(value: object, unit: str) -> float:
     if not math.isfinite(number):
         message = f"not a finite number; {needs(unit)}"
         raise QuantityError(message)
+    return scaled(number, unit_factor(written, unit))
+
+
+def unit_factor(written: str, unit: str) -> float:
+    """Factor from the `written` unit to the SI `unit`; apply it with `scaled`.
+
+    Raises
+    ------
+    QuantityError
+        No unit where one is needed, an unknown one, or one of another kind.
+    """
     if unit == "1" and not written:
-        return number
+        return 1.0
     if not written:
         message = f"no unit given; {needs(unit)}"
         raise QuantityError(message)
-    return _scaled(number, _factor(written, unit))
+    return _factor(written, unit)
 
 
 def _split(value: float | str, unit: str) -> tuple[float, str]:
@@ -230,7 +244,10 @@ def _split(value: float | str, unit: str) -> tuple[float, str]:
     return float(match[1]), match[2]
 
 
-def _scaled(number: float, factor: float) -> float:
+_Numbers = TypeVar("_Numbers", float, NDArray[np.float64])
+
+
+def scaled(number: _Numbers, factor: float) -> _Numbers:
     """Multiply, or divide by the reciprocal where that is the whole number: 165 mm is 0.165 m."""
     if 0.0 < factor < 1.0:
         reciprocal = round(1.0 / factor)

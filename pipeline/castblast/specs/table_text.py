@@ -1,0 +1,265 @@
+"""Text of a table as people save it: encoding, separator, remarks, heads; bounded in every size.
+
+A table comes from a spreadsheet, a mine-planning package or a script: UTF-8 with or without a mark
+at its beginning, UTF-16 or Windows-1252; cells apart by commas, semicolons, tabs or blanks; remarks
+behind ``#`` or ``//``. What else there is (workbooks, XML, arrays) is told by its first bytes.
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import io
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from castblast.errors import SpecError
+from castblast.specs.loading import nearest_file
+
+MOST_BYTES = 256 * 2**20
+LONGEST_LINE = 2**20
+MOST_COLUMNS = 1000
+MOST_ROWS = 5_000_000
+#: A number as a table may write it, the decimal sign aside.
+NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+
+_MARKS = (
+    (codecs.BOM_UTF8, "utf-8"),
+    (codecs.BOM_UTF32_LE, "utf-32-le"),  # before UTF-16, whose mark is its beginning
+    (codecs.BOM_UTF32_BE, "utf-32-be"),
+    (codecs.BOM_UTF16_LE, "utf-16-le"),
+    (codecs.BOM_UTF16_BE, "utf-16-be"),
+)
+_FOREIGN = (
+    (b"PK\x03\x04", "is a workbook or another zip archive; save its sheet as CSV in UTF-8"),
+    (b"\xd0\xcf\x11\xe0", "is a workbook of an old Excel; save its sheet as CSV in UTF-8"),
+    (b"\x93NUMPY", "is an array of NumPy (.npy), which has no names; write a CSV with heads"),
+    (b"\x89HDF", "is an HDF5 file; a CSV with heads is needed"),
+    (b"\x1f\x8b", "is packed with gzip; unpack it first"),
+    (b"%PDF", "is a PDF; a CSV with heads is needed"),
+    (b"<?xml", "is XML, such as IREDES; write its places as a CSV with heads"),
+)
+_SEPARATORS = (";", "\t", ",")
+_SEPARATOR_LINE = re.compile(r"sep=([;,\t|])\s*", re.IGNORECASE)
+#: A head between blanks keeps its unit in brackets: ``x [m] y [m]``.
+_WORD = re.compile(r"[^\s\[(]+(?:\s*(?:\[[^\]]*\]|\([^)]*\)))?")
+_QUOTED_OR_UNIT = re.compile(r'"[^"]*"|\[[^\]]*\]|\([^)]*\)')
+_REMARK = ("#", "//")
+_ENCODING_REMEDY = "save it as UTF-8 ('CSV UTF-8' in a spreadsheet)"
+
+
+class Sheet(NamedTuple):
+    """A table before its cells are understood.
+
+    Attributes
+    ----------
+    head_line : int
+        Line of the heads in the file.
+    heads : list of str
+    rows : iterator of (int, list of str)
+        Line of the file and cells of each row that is not blank.
+    separator : str
+        ``" "`` for any number of blanks.
+    """
+
+    head_line: int
+    heads: list[str]
+    rows: Iterator[tuple[int, list[str]]]
+    separator: str
+
+
+def open_sheet(path: Path) -> Sheet:
+    """Read a file as far as its heads; rows follow one by one.
+
+    Raises
+    ------
+    SpecError
+        One line: no file, no text, another kind of file, nothing in it, a line or a table beyond
+        all bounds. The rows may raise it too, with their line.
+    """
+    lines = _numbered(decode(path, read_bytes(path)), path)
+    remarks: list[tuple[int, str]] = []
+    separator = ""
+    for number, line in lines:
+        bare = line.strip()
+        if not bare.strip(",;\t\" '"):
+            continue
+        if bare.startswith(_REMARK):
+            remarks.append((number, bare))
+            continue
+        if match := _SEPARATOR_LINE.fullmatch(bare):
+            separator = match[1]
+            continue
+        break
+    else:
+        raise SpecError(f"{path}: is empty")
+    following = next(lines, None)
+    rest = _chained((following,) if following else (), lines)
+    separator = separator or _separator(line, following[1] if following else "")
+    head = _cells(line, separator, path, number)
+    if named := _heads_in_remark(remarks, head, separator, path):
+        return _sheet(path, *named, _rows(_chained([(number, line)], rest), separator, path))
+    return _sheet(path, number, head, separator, _rows(rest, separator, path))
+
+
+def _sheet(
+    path: Path, line: int, heads: list[str], separator: str, rows: Iterator[tuple[int, list[str]]]
+) -> Sheet:
+    heads = [head.strip() for head in heads]
+    while heads and not heads[-1]:
+        heads.pop()
+    if len(heads) > MOST_COLUMNS:
+        raise SpecError(f"{path}: line {line}: {len(heads):,} columns; at most {MOST_COLUMNS:,}")
+    return Sheet(line, heads, rows, separator)
+
+
+def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
+    """Read a file that a person named, up to `most` bytes.
+
+    Raises
+    ------
+    SpecError
+        One line: missing, a folder, unreadable, too large, or a kind of file that is no text.
+    """
+    try:
+        with path.open("rb") as file:
+            data = file.read(most + 1)
+    except FileNotFoundError:
+        raise SpecError(f"{path}: no such file{nearest_file(path)}") from None
+    except IsADirectoryError:
+        raise SpecError(f"{path}: is a folder; a table is needed") from None
+    except OSError as fault:
+        raise SpecError(f"{path}: cannot be read: {fault.strerror}") from None
+    except ValueError:  # a name with a NUL byte
+        raise SpecError(f"{str(path)!r}: is not the name of a file") from None
+    if len(data) > most:
+        raise SpecError(f"{path}: is larger than {most / 2**20:.0f} MiB; split it")
+    for mark, words in _FOREIGN:
+        if data.startswith(mark):
+            raise SpecError(f"{path}: {words}")
+    return data
+
+
+def decode(path: Path, data: bytes) -> str:
+    """Text of a file in UTF-8, UTF-16, UTF-32 with a mark, or Windows-1252 (Latin-1).
+
+    Raises
+    ------
+    SpecError
+        One line that names the encoding tried and the remedy.
+    """
+    for mark, encoding in _MARKS:
+        if data.startswith(mark):
+            return _decoded(path, data[len(mark) :], encoding)
+    if b"\0" in data[:4096]:
+        # UTF-16 without a mark: Latin letters have a zero in every other byte.
+        start = data[:4096]
+        for encoding, zeros in (("utf-16-le", start[1::2]), ("utf-16-be", start[0::2])):
+            if zeros.count(0) > 0.7 * len(zeros):
+                return _decoded(path, data, encoding)
+        raise SpecError(f"{path}: holds bytes that are no text; {_ENCODING_REMEDY}")
+    try:
+        return _decoded(path, data, "utf-8")
+    except SpecError:
+        return _decoded(path, data, "cp1252")
+
+
+def _decoded(path: Path, data: bytes, encoding: str) -> str:
+    try:
+        text = data.decode(encoding)
+    except UnicodeDecodeError:
+        name = "UTF-8 or Windows-1252" if encoding == "cp1252" else encoding.upper()
+        raise SpecError(f"{path}: is not a text file in {name}; {_ENCODING_REMEDY}") from None
+    if "\0" in text:
+        raise SpecError(f"{path}: holds bytes that are no text; {_ENCODING_REMEDY}")
+    return text
+
+
+def _numbered(text: str, path: Path) -> Iterator[tuple[int, str]]:
+    for number, line in enumerate(io.StringIO(text, newline=None), 1):
+        if len(line) > LONGEST_LINE:
+            raise SpecError(
+                f"{path}: line {number}: {len(line):,} characters; at most {LONGEST_LINE:,}"
+            )
+        yield number, line
+
+
+def _chained(
+    first: Iterable[tuple[int, str]], rest: Iterator[tuple[int, str]]
+) -> Iterator[tuple[int, str]]:
+    yield from first
+    yield from rest
+
+
+def _separator(head: str, following: str) -> str:
+    """What stands between the cells of the heads, outside quotation marks and units."""
+    outside = _QUOTED_OR_UNIT.sub("", head)
+    for separator in _SEPARATORS:
+        if separator in outside:
+            return separator
+    words = _WORD.findall(head)
+    return " " if 1 < len(words) == len(following.split()) else ","
+
+
+def _cells(line: str, separator: str, path: Path, number: int) -> list[str]:
+    if separator == " ":
+        return _WORD.findall(line)
+    return next((cells for _, cells in _rows(iter([(number, line)]), separator, path)), [])
+
+
+def _heads_in_remark(
+    remarks: list[tuple[int, str]], first: list[str], separator: str, path: Path
+) -> tuple[int, list[str], str] | None:
+    """Heads that stand in the remark above a table of numbers, as NumPy and Yade write them."""
+    if not remarks or not all(NUMBER.fullmatch(c.strip().replace(",", ".")) for c in first):
+        return None
+    number, text = remarks[-1]
+    text = text.lstrip("#/ ")
+    if separator == "," and len(first) == 1:
+        return None
+    if text.startswith("format "):
+        heads = text.removeprefix("format ").split("_")
+    else:
+        heads = _cells(text, separator, path, number)
+    named = len(heads) == len(first) and all(re.match(r"[^\W\d]", h.strip()) for h in heads)
+    return (number, heads, separator) if named else None
+
+
+def _rows(
+    lines: Iterator[tuple[int, str]], separator: str, path: Path
+) -> Iterator[tuple[int, list[str]]]:
+    """Line number and cells of the lines that are neither blank nor a remark."""
+    count = 0
+    for number, cells in _split(lines, separator, path):
+        if "".join(cells).strip():
+            count += 1
+            if count > MOST_ROWS:
+                raise SpecError(f"{path}: more than {MOST_ROWS:,} rows; split it")
+            yield number, cells
+
+
+def _split(
+    lines: Iterator[tuple[int, str]], separator: str, path: Path
+) -> Iterator[tuple[int, list[str]]]:
+    if separator == " ":
+        for number, line in lines:
+            if not line.lstrip().startswith(_REMARK):
+                yield number, line.split()
+        return
+    current = 0
+
+    def feed() -> Iterator[str]:
+        nonlocal current
+        for number, line in lines:
+            if not line.startswith(_REMARK) and not line.lstrip().startswith(_REMARK):
+                current = number
+                yield line
+
+    reader = csv.reader(feed(), delimiter=separator, skipinitialspace=True, strict=True)
+    try:
+        for cells in reader:
+            yield current, cells
+    except csv.Error as fault:
+        raise SpecError(f"{path}: line {current}: is no CSV: {fault}") from None
