@@ -59,6 +59,12 @@ class StaleResultError(SpecError):
     """Results of an earlier run that were made from something else stand in the way."""
 
 
+class OutputError(CastblastError):
+    """A file or folder that cannot be written, or a disk that is full (exit code 2)."""
+
+    exit_code = 2
+
+
 class DatasetError(CastblastError):
     """A dataset that is missing, truncated or of another kind than expected (exit code 2)."""
 

@@ -1,14 +1,30 @@
-"""Files appear whole or not at all: written under a temporary name, then renamed."""
+"""Files appear whole or not at all: written under a temporary name, then renamed.
+
+Results of several files are written into a folder of their own beside the old ones and moved into
+place together (`staged`).
+"""
 
 from __future__ import annotations
 
+import errno
 import io
-from collections.abc import Callable, Mapping
+import os
+import shutil
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from uuid import uuid4
 
 import numpy as np
 from numpy.typing import ArrayLike
+
+from castblast.errors import CastblastError, OutputError
+from castblast.stopping import deferred_stop
+
+#: A disk, a quota or the allowed size of a file is full.
+_NO_ROOM = {getattr(errno, name) for name in ("ENOSPC", "EDQUOT", "EFBIG") if hasattr(errno, name)}
+#: Folder, in that of the results, in which they lie until all of them are written.
+UNFINISHED = ".unfinished"
 
 
 def write_with(path: Path, writer: Callable[[Path], object]) -> Path:
@@ -16,15 +32,124 @@ def write_with(path: Path, writer: Callable[[Path], object]) -> Path:
 
     The temporary name keeps the suffix, by which many writers choose the format. It is nobody
     else's: threads and machines that share the folder may write the same file at the same time.
+
+    Raises
+    ------
+    OutputError
+        The folder cannot be made or written to, or the disk is full; names `path`.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.stem}.{uuid4().hex[:12]}.tmp{path.suffix}")
     try:
-        writer(temporary)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            writer(temporary)
+            temporary.replace(path)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except CastblastError:
+        raise
+    except Exception as fault:
+        cause = _disk_fault(fault)
+        if cause is None:
+            raise
+        message = f"{path}: cannot be written: {cause.strerror or cause}"
+        raise OutputError(message) from fault
     return path
+
+
+def _disk_fault(fault: BaseException) -> OSError | None:
+    """What the system said; a library may have raised another error while it tidied up."""
+    if isinstance(fault, OSError):
+        return fault
+    seen = fault.__cause__ or fault.__context__
+    while seen is not None:
+        if isinstance(seen, OSError) and seen.errno in _NO_ROOM:
+            return seen
+        seen = seen.__cause__ or seen.__context__
+    return None
+
+
+def require_writable(folder: Path) -> None:
+    """Make a folder and try to write into it, before work begins whose result goes there.
+
+    Raises
+    ------
+    OutputError
+        It cannot be made or written to.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / f".probe.{os.getpid()}"
+        probe.write_bytes(b"?")
+        probe.unlink()
+    except OSError as fault:
+        message = f"{folder}: cannot be written to: {fault.strerror or fault}"
+        raise OutputError(message) from None
+
+
+@contextmanager
+def staged(
+    folder: Path, *, resume: bool = False, keep: bool = False, replaces: Collection[str] = ()
+) -> Iterator[Path]:
+    """Give a folder to write results into; when all are there they move into `folder` together.
+
+    Moving needs no room on the disk. If the work fails or is stopped, nothing in `folder` changes.
+    For one writer at a time, see `castblast.locks`.
+
+    Parameters
+    ----------
+    folder : path
+    resume : bool
+        Go on with what an earlier run kept; otherwise that is discarded.
+    keep : bool
+        Keep what is there when the work fails or is stopped.
+    replaces : patterns
+        Files of earlier results that are removed if no new one takes their place.
+
+    Raises
+    ------
+    OutputError
+        The folder cannot be written to.
+    """
+    scratch = folder / UNFINISHED
+    if not resume:
+        shutil.rmtree(scratch, ignore_errors=True)
+    require_writable(scratch)
+    try:
+        yield scratch
+    except BaseException:
+        if not keep:
+            shutil.rmtree(scratch, ignore_errors=True)
+        raise
+    publish(scratch, folder, replaces)
+
+
+def publish(scratch: Path, folder: Path, replaces: Collection[str] = ()) -> None:
+    """Move what `scratch` holds, but for hidden things, into `folder`; then remove `scratch`.
+
+    Ctrl-C waits until that is done.
+
+    Raises
+    ------
+    OutputError
+        A file cannot be moved; names it.
+    """
+    found = (path.relative_to(scratch) for path in scratch.rglob("*") if path.is_file())
+    written = [path for path in found if not any(part.startswith(".") for part in path.parts)]
+    with deferred_stop() as stop:
+        try:
+            for name in written:
+                (folder / name).parent.mkdir(parents=True, exist_ok=True)
+                (scratch / name).replace(folder / name)
+            for old in (path for pattern in replaces for path in folder.glob(pattern)):
+                if old.relative_to(folder) not in written:
+                    old.unlink()
+        except OSError as fault:
+            message = f"{fault.filename2 or fault.filename}: cannot be replaced: {fault.strerror}"
+            raise OutputError(message) from None
+        shutil.rmtree(scratch, ignore_errors=True)
+    if stop.made:
+        stop.obey(f"stopped; the results in {folder} are complete")
 
 
 def write_text(path: Path, text: str) -> Path:

@@ -11,8 +11,9 @@ import pytest
 import xarray as xr
 from fake_blast import fake_generate, write_recipe
 
-from castblast.dataset.store import open_dataset, require_writable, write_dataset
-from castblast.errors import DatasetError
+from castblast.dataset.store import open_dataset, write_dataset
+from castblast.errors import DatasetError, OutputError
+from castblast.files import require_writable
 
 
 @pytest.fixture(scope="module")
@@ -127,7 +128,7 @@ def test_compression_and_fill_values(file):
 
 def test_folder_that_cannot_be_made(tmp_path):
     (tmp_path / "file").touch()
-    with pytest.raises(DatasetError, match="cannot be written to"):
+    with pytest.raises(OutputError, match="cannot be written to"):
         require_writable(tmp_path / "file" / "folder")
 
 
@@ -135,7 +136,7 @@ def test_folder_that_cannot_be_made(tmp_path):
 def test_unwritable_folder(tmp_path):
     tmp_path.chmod(0o500)
     try:
-        with pytest.raises(DatasetError, match="cannot be written to"):
+        with pytest.raises(OutputError, match="cannot be written to"):
             require_writable(tmp_path)
     finally:
         tmp_path.chmod(0o700)

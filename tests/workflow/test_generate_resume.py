@@ -12,7 +12,9 @@ import pytest
 from fake_blast import fake_generate, fake_simulator, write_recipe
 
 from castblast.dataset.store import open_dataset
-from castblast.errors import SimulationError, SpecError
+from castblast.dataset.workplace import sole_builder
+from castblast.errors import OutputError, SimulationError, SpecError
+from castblast.locks import LockedError
 
 #: Shards of the small recipe: 60 rows, 12 to a shard.
 SHARDS = 5
@@ -263,12 +265,21 @@ def test_progress_counts_rows_rate_and_failures(tmp_path):
     assert running[-1].endswith("ETA 0:00:00")
 
 
-def test_unwritable_place_stops_before_any_run(tmp_path):
-    from castblast.errors import DatasetError
+def test_a_second_build_in_the_same_place_is_refused(tmp_path):
+    """It would remove the shards of the first one."""
+    recipe = write_recipe(tmp_path / "r.yaml")
+    broken = fake_simulator(recipe, break_at=0)
+    target = tmp_path / "data.nc"
+    with sole_builder(target), pytest.raises(LockedError, match="is writing there; wait"):
+        fake_generate(recipe, target, simulator=broken)
+    fake_generate(recipe, target)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["DATASHEET.md", "data.nc", "r.yaml"]
 
+
+def test_unwritable_place_stops_before_any_run(tmp_path):
     (tmp_path / "file").touch()
     recipe = write_recipe(tmp_path / "r.yaml")
-    with pytest.raises(DatasetError, match="cannot be written to"):
+    with pytest.raises(OutputError, match="cannot be written to"):
         fake_generate(
             recipe,
             tmp_path / "file" / "data.nc",

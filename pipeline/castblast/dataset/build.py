@@ -23,6 +23,7 @@ from castblast.dataset.shards import ShardReport, ShardTask, run_shard
 from castblast.dataset.work import Work
 from castblast.errors import DatasetError, SimulationError, SpecError
 from castblast.progress import ProgressCallback, silent
+from castblast.stopping import interruptible
 
 #: Share of the time of the workers that scheduling may cost before the log remarks on it.
 MOST_SCHEDULING = 0.03
@@ -59,8 +60,10 @@ def build_shards(
     ------
     SpecError
         No scheduler answers at the address, or it has no workers.
+    OutputError
+        A shard cannot be written.
     DatasetError
-        A shard cannot be written, or the scheduler went away.
+        The scheduler went away.
     SimulationError
         A shard brought several workers down.
     """
@@ -90,9 +93,8 @@ def build_shards(
 
 def _warm(task: ShardTask) -> None:
     """Compile every kernel once, before several threads would want to at the same time."""
-    task.simulator.run(
-        {name: values[:1] for name, values in task.inputs.items()}, task.explosive[:1]
-    )
+    first = {name: values[:1] for name, values in task.inputs.items()}
+    interruptible(task.simulator.run, first, task.explosive[:1])
 
 
 def _reports(

@@ -104,7 +104,7 @@ def run_shard(task: ShardTask) -> ShardReport:
 
     Raises
     ------
-    DatasetError
+    OutputError
         The file cannot be written.
     """
     begin = time.perf_counter()
@@ -127,7 +127,7 @@ def write_shard(folder: Path, span: Span, rows_sha256: str, result: BatchResult)
 
     Raises
     ------
-    DatasetError
+    OutputError
         The folder cannot be written to, or the disk is full.
     """
     arrays: dict[str, NDArray[Any]] = {"status": np.asarray(result.status, dtype=np.int8)}
@@ -140,11 +140,7 @@ def write_shard(folder: Path, span: Span, rows_sha256: str, result: BatchResult)
         marks = {_ORIGIN: np.array(rows_sha256), _SEAL: np.array(seal)}
         np.savez(name, allow_pickle=False, **arrays, **marks)
 
-    try:
-        return write_with(path, write)
-    except OSError as fault:
-        message = f"{path}: cannot be written: {fault.strerror or fault}"
-        raise DatasetError(message) from None
+    return write_with(path, write)
 
 
 def read_shard(

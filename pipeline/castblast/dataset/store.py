@@ -19,7 +19,7 @@ from typing import Any
 import xarray as xr
 
 from castblast.dataset.schema import SCHEMA, SCHEMA_VERSION
-from castblast.errors import DatasetError
+from castblast.errors import DatasetError, OutputError
 from castblast.files import write_with
 
 #: Rows of a chunk of the file: what has to be read for one sample.
@@ -97,6 +97,8 @@ def disk_faults(path: Path) -> Iterator[None]:
     """
     try:
         yield
+    except OutputError as fault:
+        raise DatasetError(str(fault)) from None
     except (OSError, RuntimeError) as fault:
         message = f"{path}: cannot be written (is the disk full?): {_short(fault)}"
         raise DatasetError(message) from None
@@ -191,24 +193,6 @@ def open_dataset(path: Path) -> xr.Dataset:
     with reading_dataset(path) as dataset:
         loaded: xr.Dataset = dataset.load()
     return loaded
-
-
-def require_writable(folder: Path) -> None:
-    """Make a folder and try to write into it, before work begins whose result goes there.
-
-    Raises
-    ------
-    DatasetError
-        It cannot be made or written to.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        probe = folder / f".probe.{os.getpid()}"
-        probe.touch()
-        probe.unlink()
-    except OSError as fault:
-        message = f"{folder}: cannot be written to: {fault.strerror or fault}"
-        raise DatasetError(message) from None
 
 
 def _define(file: Any, form: xr.Dataset, rows: int) -> None:

@@ -8,14 +8,16 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from castblast.dataset.provenance import differences
-from castblast.dataset.store import reading, require_writable
+from castblast.dataset.store import reading
 from castblast.errors import DatasetError, SpecError, StaleResultError
-from castblast.files import write_text
+from castblast.files import require_writable, write_text
+from castblast.locks import only_writer
 
 _NOTE = "made_from.json"
 
@@ -23,6 +25,22 @@ _NOTE = "made_from.json"
 def work_folder(path: Path) -> Path:
     """Folder of the shards of the dataset `path`, beside it."""
     return path.with_suffix(".work")
+
+
+@contextmanager
+def sole_builder(path: Path) -> Iterator[None]:
+    """Make the folder of the dataset `path` and keep others from building there meanwhile.
+
+    Raises
+    ------
+    OutputError
+        The folder cannot be made or written to.
+    LockedError
+        Another process is building the same dataset.
+    """
+    require_writable(path.parent)
+    with only_writer(path.with_name(f".{path.name}.lock"), path):
+        yield
 
 
 def is_finished(path: Path, origin: Mapping[str, Any]) -> bool:
@@ -62,7 +80,7 @@ def open_work_folder(path: Path, origin: Mapping[str, Any], *, restart: bool) ->
     ------
     StaleResultError
         The shards were made from something else; the difference and the ways on are named.
-    DatasetError
+    OutputError
         The folder cannot be written to.
     """
     folder = work_folder(path)

@@ -197,7 +197,8 @@ def compare(
     require_training("castblast compare", (), tracking=tracking)
     remarks: list[str] = []
     wanted = without_missing(wanted, remarks)
-    from castblast.dataset.store import open_dataset, require_writable
+    from castblast.dataset.store import open_dataset
+    from castblast.files import require_writable
     from castblast.stages.compare_report import comparison_document, outcome, write_comparison
 
     table = read_rows(open_dataset(dataset), wanted, dataset)

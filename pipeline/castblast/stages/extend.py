@@ -17,9 +17,8 @@ from castblast.dataset.failures import require_success, summary
 from castblast.dataset.final import Rows, write_final
 from castblast.dataset.provenance import Parent, made_from, rows_hash
 from castblast.dataset.simulation import FloatArray, Simulator, blast_simulator
-from castblast.dataset.store import require_writable
 from castblast.dataset.work import Work
-from castblast.dataset.workplace import is_finished, open_work_folder
+from castblast.dataset.workplace import is_finished, open_work_folder, sole_builder
 from castblast.errors import SpecError
 from castblast.progress import ProgressCallback, silent
 from castblast.specs.recipe import Recipe
@@ -136,23 +135,23 @@ def produce_extension(
     if path.resolve() == existing.path.resolve():
         message = f"{path}: is the dataset to be extended; choose another place with --out"
         raise SpecError(message)
-    require_writable(path.parent)
     origin = made_from(recipe, existing.explosives, parents)
-    if not restart and is_finished(path, origin):
-        return already_finished(path)
-    new = new_rows.design(existing, recipe, simulator)
-    folder = open_work_folder(path, origin, restart=restart).resolve()
-    work = Work(new, simulator, rows_hash(origin), folder, recipe.shard_size)
-    lines = build_shards(work, workers=workers, scheduler=scheduler, progress=progress)
-    rows = Rows(
-        design=join_designs([existing.design, new]),
-        status=np.concatenate([existing.status, work.status]),
-        results=chain(existing.results(), work.results()),
-    )
-    names = tuple(entry.name for entry in existing.explosives)
-    require_success(recipe, names, rows.design, rows.status)
-    content = write_final(
-        path, folder, source, existing.explosives, rows, parents=parents, progress=progress
-    )
-    lines += [f"{parents[-1].size} rows of {parents[-1].id} taken over", summary(rows.status)]
-    return finish(path, content, lines)
+    with sole_builder(path):
+        if not restart and is_finished(path, origin):
+            return already_finished(path)
+        new = new_rows.design(existing, recipe, simulator)
+        folder = open_work_folder(path, origin, restart=restart).resolve()
+        work = Work(new, simulator, rows_hash(origin), folder, recipe.shard_size)
+        lines = build_shards(work, workers=workers, scheduler=scheduler, progress=progress)
+        rows = Rows(
+            design=join_designs([existing.design, new]),
+            status=np.concatenate([existing.status, work.status]),
+            results=chain(existing.results(), work.results()),
+        )
+        names = tuple(entry.name for entry in existing.explosives)
+        require_success(recipe, names, rows.design, rows.status)
+        content = write_final(
+            path, folder, source, existing.explosives, rows, parents=parents, progress=progress
+        )
+        lines += [f"{parents[-1].size} rows of {parents[-1].id} taken over", summary(rows.status)]
+        return finish(path, content, lines)

@@ -15,9 +15,14 @@ from castblast.dataset.final import Rows, write_final
 from castblast.dataset.meter import peak_memory
 from castblast.dataset.provenance import ExplosiveSource, load_explosives, made_from, rows_hash
 from castblast.dataset.simulation import Simulator, blast_simulator
-from castblast.dataset.store import reading_dataset, require_writable
+from castblast.dataset.store import reading_dataset
 from castblast.dataset.work import Work
-from castblast.dataset.workplace import close_work_folder, is_finished, open_work_folder
+from castblast.dataset.workplace import (
+    close_work_folder,
+    is_finished,
+    open_work_folder,
+    sole_builder,
+)
 from castblast.progress import ProgressCallback, silent
 from castblast.specs.recipe import RecipeSource, load_recipe
 
@@ -76,8 +81,10 @@ def generate(
     ------
     SpecError
         Faults of recipe or explosives, impossible designs, results of another recipe in the way.
-    DatasetError
-        Nothing can be written there.
+    OutputError
+        Nothing can be written there, or the disk is full.
+    LockedError
+        Another process is building the same dataset.
     SimulationError
         More failed samples than the recipe allows; the shards are kept.
     """
@@ -112,20 +119,20 @@ def produce(
 ) -> GenerateOutcome:
     """Build a dataset with a given simulator; see `generate`."""
     recipe = source.recipe
-    require_writable(path.parent)
     origin = made_from(recipe, explosives)
-    if not restart and is_finished(path, origin):
-        return already_finished(path)
-    progress(0.0, "drawing the design")
-    design = make_design(recipe, simulator, str(source.path))
-    folder = open_work_folder(path, origin, restart=restart).resolve()
-    work = Work(design, simulator, rows_hash(origin), folder, recipe.shard_size)
-    lines = build_shards(work, workers=workers, scheduler=scheduler, progress=progress)
-    names = tuple(entry.name for entry in explosives)
-    require_success(recipe, names, design, work.status)
-    rows = Rows(design, work.status, work.results())
-    content = write_final(path, folder, source, explosives, rows, progress=progress)
-    return finish(path, content, [*lines, summary(work.status)])
+    with sole_builder(path):
+        if not restart and is_finished(path, origin):
+            return already_finished(path)
+        progress(0.0, "drawing the design")
+        design = make_design(recipe, simulator, str(source.path))
+        folder = open_work_folder(path, origin, restart=restart).resolve()
+        work = Work(design, simulator, rows_hash(origin), folder, recipe.shard_size)
+        lines = build_shards(work, workers=workers, scheduler=scheduler, progress=progress)
+        names = tuple(entry.name for entry in explosives)
+        require_success(recipe, names, design, work.status)
+        rows = Rows(design, work.status, work.results())
+        content = write_final(path, folder, source, explosives, rows, progress=progress)
+        return finish(path, content, [*lines, summary(work.status)])
 
 
 def already_finished(path: Path) -> GenerateOutcome:

@@ -17,6 +17,7 @@ from castblast.nearfield.case import EndMode, TensionMode
 from castblast.specs.case import parse_values
 from castblast.specs.explosive import load_explosive
 from castblast.stages.explosives import require_consistent
+from castblast.stopping import interruptible
 from castblast.variables import VARIABLES
 
 
@@ -77,7 +78,7 @@ def simulate(
         parameter_set=parameter_set,
     )
     case = make_case(products, inputs, settings)
-    result = run_blast(case)
+    result = interruptible(run_blast, case)
     document = _document(spec.name, mode, parameter_set, inputs, result)
     status = Status(result.status)
     if status is not Status.OK:

@@ -75,7 +75,8 @@ def train(
 
     chosen = read_model_specs(list(specs) or [resource("models/specs/reference_mlp.yaml")])
     require_training("castblast train", chosen, tracking=tracking)
-    from castblast.dataset.store import open_dataset, require_writable
+    from castblast.dataset.store import open_dataset
+    from castblast.files import require_writable
 
     table = read_rows(open_dataset(dataset), chosen, dataset)
     out = dataset.parent / "fits" if out is None else out

@@ -66,7 +66,8 @@ def tune(
 
     wanted = read_model_spec(spec)
     require_training("castblast tune", [wanted], "tune", tracking=tracking)
-    from castblast.dataset.store import open_dataset, require_writable
+    from castblast.dataset.store import open_dataset
+    from castblast.files import require_writable
     from castblast.surrogate import tuning
 
     tuning.check_study(wanted, trials, timeout)
