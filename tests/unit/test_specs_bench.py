@@ -11,9 +11,9 @@ import pytest
 import yaml
 
 from castblast.errors import SpecError
-from castblast.resources import resource
+from castblast.resources import find_spec, resource
 from castblast.specs.ball_files import read_balls
-from castblast.specs.bench import find_bench, load_bench
+from castblast.specs.bench import load_bench
 
 BENCH: dict[str, Any] = {
     "name": "small",
@@ -41,7 +41,7 @@ def said(tmp_path: Path, **change: object) -> str:
 def test_shipped_benches(path: Path) -> None:
     spec = load_bench(path)
     assert spec.name == path.stem
-    assert find_bench(path.stem) == path
+    assert find_spec(path.stem, "bench") == path
     assert spec.contact.to_law()._asdict() == load_bench("echelon_84x24").contact.to_law()._asdict()
 
 
@@ -185,4 +185,4 @@ def test_folder_of_the_same_name_hides_no_shipped_bench(
     with monkeypatch.context() as patch:
         patch.chdir(tmp_path)
         (tmp_path / "demo").mkdir()
-        assert find_bench("demo").name == "demo.yaml"
+        assert find_spec("demo", "bench").name == "demo.yaml"

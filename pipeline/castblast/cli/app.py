@@ -11,6 +11,7 @@ from castblast.cli import (
     muckpile,
     predict,
     simulate,
+    specs,
     surrogates,
     web,
 )
@@ -21,7 +22,6 @@ app = typer.Typer(
     "velocity and muckpile.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    add_completion=False,
 )
 
 
@@ -42,7 +42,7 @@ def _options(
     """Take the options that stand before a verb."""
 
 
-for _module in (demo, predict, simulate, generate, surrogates, infill, muckpile, web):
+for _module in (demo, predict, simulate, generate, surrogates, infill, muckpile, web, specs):
     _module.add_to(app)
 app.add_typer(datasets.app, name="dataset")
 app.add_typer(explosive.app, name="explosive")

@@ -9,9 +9,12 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from castblast.progress import ProgressCallback, silent
+
+#: First characters of a number.
+_NUMERIC = "+-.0123456789"
 
 
 @dataclass
@@ -46,18 +49,23 @@ class Screen:
             print(line, file=sys.stderr)
 
     def table(self, header: Sequence[str], rows: Sequence[Sequence[str]], title: str = "") -> None:
-        """Print a table for people; the first column is left-aligned, the others right."""
+        """Print a table for people; columns of numbers are aligned right, words left."""
         if self.as_json:
             return
         from rich import box
         from rich.console import Console
         from rich.table import Table
+        from rich.text import Text
 
-        table = Table(title=title or None, title_justify="left", box=box.SIMPLE_HEAD)
+        # Texts, not markup: a head like "heat [MJ/kg]" and a name like "x[/b]" stand as they are.
+        heading = Text(title) if title else None
+        table = Table(title=heading, title_justify="left", box=box.SIMPLE_HEAD)
         for index, name in enumerate(header):
-            table.add_column(name, justify="left" if index == 0 else "right", no_wrap=index == 0)
+            numbers = index > 0 and any(row[index][:1] in _NUMERIC for row in rows if row[index])
+            justify: Literal["left", "right"] = "right" if numbers else "left"
+            table.add_column(Text(name), justify=justify, no_wrap=index == 0)
         for row in rows:
-            table.add_row(*row)
+            table.add_row(*map(Text, row))
         Console(width=None if sys.stdout.isatty() else 120).print(table)
 
     def document(self, payload: Mapping[str, Any]) -> None:

@@ -4,9 +4,11 @@ Every verb takes a `Screen` first and returns its result as a mapping. The decor
 options that all verbs share, and prints the result as JSON when that is asked for.
 """
 
+import copy
 import inspect
+import re
 from collections.abc import Callable, Mapping
-from typing import Annotated, Any, TypeAlias, get_type_hints
+from typing import Annotated, Any, TypeAlias, get_args, get_type_hints
 
 import typer
 
@@ -52,7 +54,9 @@ def verb(
 
         hints = get_type_hints(function, include_extras=True)
         own = [
-            parameter.replace(annotation=hints[parameter.name], kind=inspect.Parameter.KEYWORD_ONLY)
+            parameter.replace(
+                annotation=_literal_help(hints[parameter.name]), kind=inspect.Parameter.KEYWORD_ONLY
+            )
             for parameter in inspect.signature(function).parameters.values()
             if parameter.name != "screen"
         ]
@@ -65,9 +69,28 @@ def verb(
         )
         command.__signature__ = inspect.Signature([place, *own, *shared])  # type: ignore[attr-defined]
         command.__annotations__ = {p.name: p.annotation for p in (place, *own, *shared)}
-        command.__doc__ = function.__doc__
+        command.__doc__ = literal(function.__doc__ or "")
         # A verb may be called `check` in two groups: its own name is the default.
         app.command(name or function.__name__.replace("_", "-"))(command)
         return function
 
     return register
+
+
+def literal(text: str) -> str:
+    """Escape what the terminal library would take for markup: ``[m]`` is a unit here."""
+    return re.sub(r"(?<!\\)\[(?=[a-z#/@])", r"\\[", text)
+
+
+def _literal_help(annotation: Any) -> Any:
+    """Give the annotation of an option with its help text made literal."""
+    kind, *details = get_args(annotation) or (annotation,)
+    if not details:
+        return annotation
+    copies = []
+    for detail in details:
+        shown = copy.copy(detail)
+        if getattr(shown, "help", None):
+            shown.help = literal(shown.help)
+        copies.append(shown)
+    return Annotated[kind, *copies]

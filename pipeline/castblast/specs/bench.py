@@ -14,12 +14,12 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from castblast.errors import SpecError, nearest_name
+from castblast.errors import nearest_name
 from castblast.muckpile.bench import Bench, check_bench, polygon_bench
 from castblast.muckpile.contact import ContactLaw, DashpotMode
 from castblast.muckpile.outline import polygon_area
 from castblast.muckpile.packing import check_packing
-from castblast.resources import resource
+from castblast.resources import find_spec
 from castblast.specs.balls import BallsSpec
 from castblast.specs.firing import Direction, FiringPlan
 from castblast.specs.ground import GroundSpec, one_or_many
@@ -27,7 +27,6 @@ from castblast.specs.loading import Spec, load_spec
 from castblast.specs.quantity import QuantityError, QuantityIn, convert, convert_variable
 from castblast.variables import VARIABLES
 
-_FOLDER = "data_specs/benches"
 _RIGHT_ANGLE = math.pi / 2.0
 _FROM_BENCH = ("burden", "spacing", "bench_height", "face_angle")
 
@@ -309,26 +308,6 @@ class BenchSpec(Spec):
         }
 
 
-def find_bench(name_or_path: str | Path) -> Path:
-    """Path of a bench file: one that came with castblast, by name, or a user's own.
-
-    Raises
-    ------
-    SpecError
-        A bare name that no shipped bench has; the nearest is named.
-    """
-    path = Path(name_or_path)
-    if path.suffix or path.parent != Path() or path.is_file():
-        return path
-    folder = resource(_FOLDER)
-    known = sorted(entry.stem for entry in folder.glob("*.yaml"))
-    if str(path) in known:
-        return folder / f"{path}.yaml"
-    hint = nearest_name(str(path), known)
-    message = f"unknown bench '{path}'{hint or ';'} known: {', '.join(known)}; or a YAML file"
-    raise SpecError(message)
-
-
 def load_bench(name_or_path: str | Path) -> BenchSpec:
     """Read a bench file.
 
@@ -337,4 +316,4 @@ def load_bench(name_or_path: str | Path) -> BenchSpec:
     SpecError
         One line per fault of the file.
     """
-    return load_spec(find_bench(name_or_path), BenchSpec)
+    return load_spec(find_spec(name_or_path, "bench"), BenchSpec)

@@ -9,6 +9,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from castblast.errors import SpecError, nearest_name
+from castblast.resources import find_spec
 from castblast.specs.loading import Spec, load_spec
 from castblast.specs.quantity import parse_variable
 from castblast.variables import INPUT_NAMES
@@ -42,8 +43,8 @@ class CaseSpec(Spec):
 
 
 def read_case(path: Path | None) -> CaseSpec:
-    """Read a case file; without one, the defaults."""
-    return CaseSpec() if path is None else load_spec(path, CaseSpec)
+    """Read a case, from a file or one that came with castblast, by name; the defaults without."""
+    return CaseSpec() if path is None else load_spec(find_spec(path, "case"), CaseSpec)
 
 
 def split_assignments(assignments: Iterable[str]) -> dict[str, str]:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeAlias, get_args
 
 from castblast.errors import SpecError, nearest_name
+from castblast.resources import find_spec
 from castblast.specs.loading import make_spec, read_yaml
 from castblast.specs.model_base import (
     ALL_FEATURES,
@@ -64,13 +65,14 @@ _KINDS: dict[str, type[ModelSpec]] = {
 
 
 def read_model_spec(path: Path) -> ModelSpec:
-    """Read a candidate from its YAML file.
+    """Read a candidate from its YAML file, or one that came with castblast, by name.
 
     Raises
     ------
     SpecError
         Unreadable file, unknown family, unknown or unusable settings; all faults at once.
     """
+    path = find_spec(path, "model spec")
     content: dict[str, Any] = read_yaml(path)
     kind = content.get("kind")
     if kind not in _KINDS:

@@ -16,6 +16,7 @@ import yaml
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from castblast.errors import nearest_name
+from castblast.resources import find_spec
 from castblast.specs.case import ModeName, TensionName
 from castblast.specs.loading import Spec, make_spec, parse_yaml, read_text
 from castblast.specs.quantity import QuantityIn, convert, convert_variable
@@ -372,13 +373,16 @@ class RecipeSource(NamedTuple):
 
 
 def load_recipe(path: Path, size: int | None = None) -> RecipeSource:
-    """Read a recipe file; `size` replaces the number of rows, in the kept text too.
+    """Read a recipe, from a file or one that came with castblast, by name.
+
+    `size` replaces the number of rows, in the kept text too.
 
     Raises
     ------
     SpecError
         One line for every fault.
     """
+    path = find_spec(path, "recipe")
     text = read_text(path)
     content = parse_yaml(text, str(path))
     if size is not None and size != content.get("size"):

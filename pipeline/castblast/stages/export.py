@@ -20,6 +20,7 @@ from castblast.extras import require
 from castblast.files import write_text, write_with
 from castblast.network import Network
 from castblast.progress import ProgressCallback, silent
+from castblast.resources import SHIPPED_NETWORKS, is_bare_name, resource
 from castblast.stages.fitting import FIT_STORE
 
 if TYPE_CHECKING:
@@ -150,7 +151,7 @@ def _write_bytes(path: Path, content: bytes) -> None:
 
 
 def find_network(fit: Path) -> Path:
-    """Find the network.json meant by a file, the folder of a fit, or a folder of fits.
+    """Find the network.json meant by a file, the folder of a fit or of fits, or a shipped name.
 
     Raises
     ------
@@ -159,6 +160,8 @@ def find_network(fit: Path) -> Path:
     """
     if fit.is_file():
         return fit
+    if is_bare_name(fit) and not fit.is_dir() and str(fit) in SHIPPED_NETWORKS:
+        return resource(SHIPPED_NETWORKS[str(fit)])
     comparison = fit / "comparison.json"
     if comparison.is_file():
         try:

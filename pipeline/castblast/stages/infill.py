@@ -17,6 +17,7 @@ from castblast.dataset.store import reading_dataset
 from castblast.errors import SpecError
 from castblast.network import Floats, Network, explosive_index, member_spread
 from castblast.progress import ProgressCallback, part, silent
+from castblast.resources import is_bare_name
 from castblast.specs.recipe import Recipe
 from castblast.surrogate.infill import POOL_FACTOR, choose_batch, infill_worth
 
@@ -141,7 +142,7 @@ def _find_model(model: Path) -> Network | ModelSpec:
     from castblast.specs.model import ModelSpec, read_model_spec
     from castblast.stages.export import find_network
 
-    if model.suffix in (".yaml", ".yml"):
+    if model.suffix in (".yaml", ".yml") or (is_bare_name(model) and not model.is_dir()):
         return read_model_spec(model)
     path = find_network(model)
     network = read_network(path)

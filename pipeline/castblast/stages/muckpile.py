@@ -21,8 +21,9 @@ from castblast.muckpile.terrain import wall_faults
 from castblast.muckpile.threads import thread_count
 from castblast.muckpile.walls import Walls, bench_walls, join, slope
 from castblast.progress import ProgressCallback, silent
+from castblast.resources import find_spec
 from castblast.specs.balls import ChosenSizes
-from castblast.specs.bench import BenchSpec, find_bench, load_bench
+from castblast.specs.bench import BenchSpec, load_bench
 from castblast.specs.ground import read_ground, rough_ground
 from castblast.specs.quantity import parse_quantity
 from castblast.stages.muckpile_deck import Decks, write_decks
@@ -99,7 +100,7 @@ def run_muckpile(
     SimulationError
         The simulation became unstable; its last restart file is kept.
     """
-    path = find_bench(bench)
+    path = find_spec(bench, "bench")
     spec = _with_options(load_bench(path), balls, velocity)
     spec = _with_numerics(spec, precision, sleeping)
     if seed is not None:

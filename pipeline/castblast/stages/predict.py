@@ -18,7 +18,7 @@ from castblast.bands import BAND_WORDS, band_document, show_band, show_value
 from castblast.design import require_possible
 from castblast.export.json_file import read_network
 from castblast.network import Floats, Network, RowPredictions, member_spread
-from castblast.resources import resource
+from castblast.resources import SHIPPED_NETWORKS, is_bare_name, resource
 from castblast.stages.predict_columns import (
     explosive_position,
     network_designs,
@@ -26,12 +26,6 @@ from castblast.stages.predict_columns import (
     row_violations,
 )
 from castblast.variables import VARIABLES
-
-#: Networks that come with castblast by the recipe of their dataset; the first is taken by default.
-SHIPPED_NETWORKS = {
-    "full": "models/chosen/network.json",
-    "paper": "models/chosen/paper/network.json",
-}
 
 
 @dataclass(frozen=True)
@@ -58,9 +52,8 @@ def load_network(path: Path | None = None) -> Network:
         Missing or unusable file.
     """
     name = "full" if path is None else str(path)
-    if name not in SHIPPED_NETWORKS or Path(name).exists():
-        return read_network(Path(name))
-    return read_network(resource(SHIPPED_NETWORKS[name]))
+    shipped = is_bare_name(name) and name in SHIPPED_NETWORKS
+    return read_network(resource(SHIPPED_NETWORKS[name]) if shipped else Path(name))
 
 
 def predict(
