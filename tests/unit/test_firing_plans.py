@@ -210,6 +210,60 @@ def test_velocity_of_each_hole_by_its_own_design(tmp_path: Path) -> None:
         make_plan(spec, spec.bench.to_bench(), tmp_path)
 
 
+def test_a_charge_by_its_mass_is_the_same_design(tmp_path: Path) -> None:
+    """103.17 kg of ANFO in 150 mm are 7.298 m: below 2.702 m of stemming in a bench of 10 m.
+
+    Written either way the design is inside the training data and has the same velocity.
+    """
+    design = {"explosive": "ANFO", "ucs": "100 MPa", "hole_diameter": "150 mm"}
+    bench = {"length": "12 m", "width": "9 m", "height": "10 m", "spacing": "3.6 m"}
+    length = 103.17 / (800.0 * 0.25 * pi * 0.15**2)
+    plans = []
+    for head, cell in (
+        ("charge_mass [kg]", 103.17),
+        ("stemming_length [m]", repr(10.0 - length)),
+        ("charge_length [m]", repr(length)),
+    ):
+        holes_file(tmp_path, f"-1,1,0,{cell}", head=f"x [m],y [m],delay [ms],{head}")
+        spec = spec_with(
+            tmp_path, {"holes": "holes.csv", "blocks": "nearest_hole"},
+            velocity=None, surrogate=design, bench=bench,
+        )  # fmt: skip
+        plans.append(make_plan(spec, spec.bench.to_bench(), tmp_path))
+    assert all(plan.prediction["in_domain"] for plan in plans)
+    assert [plan.speed for plan in plans] == pytest.approx([plans[0].speed] * 3, rel=1e-12)
+    assert plans[0].prediction["explosive"] == "anfo"
+
+
+def test_a_hole_that_says_how_it_is_charged_leaves_the_bench_behind(tmp_path: Path) -> None:
+    """Its stemming replaces the charge of the bench file; two charges of one hole are refused."""
+    surrogate = {"explosive": "anfo", "charge_length": "5 m", "hole_diameter": "150 mm"}
+    bench = {"length": "12 m", "width": "9 m", "height": "10 m"}
+
+    def plan_of(head: str, cells: str) -> Any:
+        holes_file(tmp_path, f"-1,1,0,{cells}", head=f"x [m],y [m],delay [ms],{head}")
+        firing = {"holes": "holes.csv", "blocks": "nearest_hole"}
+        spec = spec_with(tmp_path, firing, velocity=None, surrogate=surrogate, bench=bench)
+        return make_plan(spec, spec.bench.to_bench(), tmp_path)
+
+    found = plan_of("stemming_length [m]", "2.7").speed
+    common = {"bench_height": 10.0, "hole_diameter": 0.15, "stemming_length": 2.7}
+    assert found == pytest.approx(predict(common, "anfo")["burden_velocity"], rel=1e-12)
+    with pytest.raises(SpecError, match=r"line 2: charge_mass and charge_length are both given"):
+        plan_of("charge_mass [kg],charge_length [m]", "75,5")
+    with pytest.raises(SpecError, match=r"line 2: stemming_length 9 m and charge_length 5\.3\d* m"):
+        plan_of("charge_mass [kg],stemming_length [m]", "75,9")
+
+
+def test_a_design_that_no_bench_can_hold_names_the_bench_file(tmp_path: Path) -> None:
+    surrogate = {"explosive": "anfo", "charge_length": "5 m", "stemming_length": "4 m"}
+    spec = spec_with(tmp_path, {}, velocity=None, surrogate=surrogate)
+    with pytest.raises(
+        SpecError, match=r"^plans: surrogate: stemming_length 4 m and charge_length"
+    ):
+        make_plan(spec, spec.bench.to_bench(), tmp_path)
+
+
 @pytest.mark.parametrize(
     ("firing", "line"),
     [

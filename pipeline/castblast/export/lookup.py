@@ -8,9 +8,16 @@ from itertools import product
 
 import numpy as np
 
+from castblast.design import COMPLETED, complete_columns, design_fault_columns
 from castblast.export.plain import example_row
-from castblast.network import Floats, InputColumn, Network, predict_rows
-from castblast.variables import STEMMING_RATIO, VARIABLES
+from castblast.network import (
+    Floats,
+    InputColumn,
+    Network,
+    keeps_ranges_and_rules,
+    predict_rows,
+)
+from castblast.variables import INPUT_NAMES, VARIABLES
 
 #: What a blaster looks up by; other inputs stay at an example design.
 _AXES = ("hole_diameter", "burden", "ucs", "bench_height")
@@ -20,8 +27,8 @@ _LEVELS = 5
 def lookup_csv(network: Network) -> str:
     """Write answers over the grid of the first axes that the network has, usual units.
 
-    The charge fills what a stemming of 0.7 burdens leaves, where the network takes a charge
-    length. Rows outside the domain are left out; the others are inside or unusual.
+    Spacing, stemming and charge follow the axes by the rule of a design. Designs that no bench can
+    hold and rows outside the domain are left out; the others are inside or unusual.
     """
     axes = [name for name in _AXES if name in network.input_names] or [network.input_names[0]]
     rows = _grid(network, axes)
@@ -44,7 +51,7 @@ def lookup_csv(network: Network) -> str:
 
 
 def _grid(network: Network, axes: list[str]) -> Floats:
-    """Rows of the grid that keep ranges and rules, (n, k)."""
+    """Rows of the grid that are possible and keep ranges and rules, (n, k)."""
     names = network.input_names
     columns = {column.name: column for column in network.inputs}
     levels = [_levels(columns[name]) for name in axes]
@@ -52,14 +59,13 @@ def _grid(network: Network, axes: list[str]) -> Floats:
     for row, values in zip(rows, product(*levels), strict=True):
         for name, value in zip(axes, values, strict=True):
             row[names.index(name)] = value
-    if {"charge_length", "bench_height", "burden"} <= set(names):
-        height, burden = (rows[:, names.index(name)] for name in ("bench_height", "burden"))
-        rows[:, names.index("charge_length")] = height - STEMMING_RATIO * burden
-    lower, upper = ([getattr(c, end) for c in network.inputs] for end in ("lower", "upper"))
-    kept = np.all((rows >= lower) & (rows <= upper), axis=1)
-    row_of = dict(zip(names, rows.T, strict=True))
-    for rule in network.constraints:
-        kept &= rule.margin(row_of) >= 0.0
+    given = {n: rows[:, i].copy() for i, n in enumerate(names) if n not in COMPLETED}
+    full = complete_columns({n: v for n, v in given.items() if n in INPUT_NAMES}, len(rows))
+    for name in set(names) & set(COMPLETED):
+        rows[:, names.index(name)] = full[name]
+    kept = keeps_ranges_and_rules(network, rows)
+    for fault in design_fault_columns(full, len(rows)):
+        kept &= ~fault.rows
     return np.asarray(rows[kept])
 
 

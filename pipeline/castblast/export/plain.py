@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from castblast.design import resolve_design
 from castblast.export.json_file import pretty
 from castblast.network import (
     BLAME,
@@ -24,7 +25,7 @@ from castblast.network import (
     explosive_index,
     in_domain,
 )
-from castblast.variables import STEMMING_RATIO, VARIABLES
+from castblast.variables import VARIABLES
 
 #: Files of one export: name to contents.
 Files = dict[str, bytes]
@@ -130,11 +131,8 @@ def example_row(network: Network) -> list[float]:
 
 
 def _usual_values(network: Network) -> list[float]:
-    """Defaults of the variables; hole and charge as the tools of castblast complete them."""
-    full = {n: v.default for n, v in VARIABLES.items() if v.default is not None}
-    full["spacing"], full["charge_diameter"] = full["burden"], full["hole_diameter"]
-    full["stemming_length"] = STEMMING_RATIO * full["burden"]
-    full["charge_length"] = full["bench_height"] - full["stemming_length"]
+    """Defaults of the variables, completed by the rule of a design."""
+    full = resolve_design({})
     middle = {c.name: 0.5 * (c.lower + c.upper) for c in network.inputs}
     return [full.get(name, middle[name]) for name in network.input_names]
 

@@ -8,6 +8,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, model_validator
 
+from castblast.design import charge_mass, resolve_design
+from castblast.errors import SpecError
 from castblast.muckpile.bench import Bench
 from castblast.muckpile.fragments import (
     Pattern,
@@ -21,7 +23,7 @@ from castblast.muckpile.fragments import (
 from castblast.specs.explosive import load_explosive
 from castblast.specs.loading import Spec
 from castblast.specs.quantity import QuantityError, QuantityIn, VariableIn
-from castblast.variables import STEMMING_RATIO, VARIABLES
+from castblast.variables import VARIABLES
 
 _Size = Annotated[float, QuantityIn("m", 1e-3, 20.0)]
 _DESCRIPTIONS = {"friable": 10.0, "massive": 50.0}
@@ -112,7 +114,7 @@ def fragment_curve(spec: FragmentsSpec, bench: Bench, design: Mapping[str, Any])
     SpecError
         Unknown explosive.
     ValueError
-        The median is not below the largest fragment, or there is no room for a charge.
+        The median is not below the largest fragment, or a design that no bench can hold.
     """
     if spec.median is not None and spec.uniformity is not None:
         curve = RosinRammler(spec.median, spec.uniformity)
@@ -133,14 +135,8 @@ def _pattern(spec: FragmentsSpec, bench: Bench, design: Mapping[str, Any]) -> Pa
     strength = spec.weight_strength
     if strength is None:
         strength = explosive.heat_of_explosion / load_explosive("anfo").heat_of_explosion
-    charge = spec.charge_length or design.get("charge_length")
-    if charge is None:
-        charge = bench.height - design.get("stemming_length", STEMMING_RATIO * bench.burden)
-    if not 0.0 < charge <= bench.height:
-        message = f"charge_length {charge:.3g} m does not fit a bench {bench.height:g} m high"
-        raise ValueError(message)
+    hole = _hole(spec, bench, design)
     density, modulus, ratio = (value(n) for n in ("rock_density", "young_modulus", "poisson_ratio"))
-    diameter = value("hole_diameter")
     description = _DESCRIPTIONS.get(spec.rock, 0.0)
     if spec.rock == "jointed" and spec.joint_spacing is not None:
         description = joint_factor(
@@ -158,12 +154,31 @@ def _pattern(spec: FragmentsSpec, bench: Bench, design: Mapping[str, Any]) -> Pa
         burden=bench.burden,
         spacing=bench.spacing,
         bench_height=bench.height,
-        hole_diameter=diameter,
-        charge_length=charge,
-        charge_mass=explosive.density * 0.25 * math.pi * diameter**2 * charge,
+        hole_diameter=hole["hole_diameter"],
+        charge_length=hole["charge_length"],
+        charge_mass=charge_mass(explosive.density, hole["charge_diameter"], hole["charge_length"]),
         weight_strength=strength,
         drilling_deviation=spec.drilling_deviation,
         delay=spec.hole_delay,
         delay_deviation=spec.delay_deviation,
         wave_velocity=math.sqrt(stiffness / density),
     )
+
+
+def _hole(spec: FragmentsSpec, bench: Bench, design: Mapping[str, Any]) -> dict[str, float]:
+    """Inputs of the hole by the rule of a design: those of `spec`, of `design`, completed."""
+    own = {
+        "hole_diameter": spec.hole_diameter,
+        "charge_length": spec.charge_length,
+        "burden": bench.burden,
+        "spacing": bench.spacing,
+        "bench_height": bench.height,
+    }
+    names = ("hole_diameter", "charge_diameter", "stemming_length", "charge_length")
+    values = {name: float(design[name]) for name in names if name in design}
+    if spec.charge_length is not None:
+        values.pop("stemming_length", None)  # that of the surrogate goes with its own charge
+    try:
+        return resolve_design(values | {n: v for n, v in own.items() if v is not None})
+    except SpecError as fault:
+        raise ValueError("; ".join(str(fault).splitlines())) from None

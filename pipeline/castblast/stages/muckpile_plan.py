@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from castblast.design import charge_length, complete_columns
 from castblast.errors import SpecError
 from castblast.muckpile.bench import Bench, assign_blocks, block_centres, block_velocities
 from castblast.muckpile.particles import FloatArray, IntArray
@@ -16,12 +16,13 @@ from castblast.muckpile.timing import firing_front_azimuth, nearest_holes, scatt
 from castblast.specs.bench import BenchSpec
 from castblast.specs.explosive import load_explosive
 from castblast.specs.holes import Holes, blocks_of_holes, read_holes
-from castblast.variables import VARIABLES
 
 #: Neighbours of a hole, over the larger of burden and spacing: those beside it and across.
 _NEIGHBOURS = 1.5
 _KEPT = ("explosive", "burden_velocity", "inputs", "in_domain", "domain_faults", "model")
 _MOST_FAULTS = 5
+#: A hole that gives one of these says how it is charged: those of the bench are not its own.
+_SHARED = frozenset({"stemming_length", "charge_length"})
 
 
 class Plan(NamedTuple):
@@ -138,15 +139,22 @@ def _common_speed(spec: BenchSpec) -> tuple[float, dict[str, Any] | None]:
     design = spec.design()
     if design is None:
         return spec.velocity or 0.0, None
-    answer = _predict(design)
+    try:
+        answer = _predict(design)
+    except SpecError as fault:
+        lines = [f"{spec.name}: surrogate: {line}" for line in str(fault).splitlines()]
+        raise SpecError("\n".join(lines)) from None
     return answer["burden_velocity"], {key: answer[key] for key in _KEPT}
 
 
 def _predict(design: Mapping[str, Any]) -> dict[str, Any]:
     from castblast.stages.predict import predict
 
-    values = {name: value for name, value in design.items() if name != "explosive"}
-    return predict(values, design["explosive"])
+    return predict(_inputs(design), design["explosive"])
+
+
+def _inputs(design: Mapping[str, Any]) -> dict[str, float]:
+    return {name: value for name, value in design.items() if name != "explosive"}
 
 
 def _hole_speeds(
@@ -169,7 +177,7 @@ def _hole_speeds(
                 speed[k] = spec.velocity
             continue
         try:
-            complete = _with_charge(design | holes.design[k])
+            complete = _charged(design, holes.design[k])
             key = repr(sorted(complete.items()))
             answers[key] = answers.get(key) or _predict(complete)
         except SpecError as fault:
@@ -182,17 +190,22 @@ def _hole_speeds(
     return speed, _summary(asked)
 
 
-def _with_charge(design: dict[str, Any]) -> dict[str, Any]:
-    """Turn a mass of charge into its length in the hole."""
-    mass = design.pop("charge_mass", None)
-    if mass is None:
-        return design
-    default = VARIABLES["hole_diameter"].default or math.nan
-    diameter = design.get("charge_diameter") or design.get("hole_diameter") or default
-    density = load_explosive(design["explosive"]).density
-    design["charge_length"] = mass / (density * 0.25 * math.pi * diameter**2)
-    design.pop("stemming_length", None)
-    return design
+def _charged(design: Mapping[str, Any], hole: Mapping[str, Any]) -> dict[str, Any]:
+    """Design of a hole; how it is charged comes from the hole alone where it says so."""
+    own = dict(hole)
+    mass = own.pop("charge_mass", None)
+    if mass is not None and "charge_length" in own:
+        message = "charge_mass and charge_length are both given: one of them is needed"
+        raise SpecError(message)
+    common = dict(design)
+    if mass is not None or not _SHARED.isdisjoint(own):
+        common = {name: value for name, value in design.items() if name not in _SHARED}
+    full = common | own
+    if mass is not None:
+        diameter = complete_columns(_inputs(full), 1)["charge_diameter"]
+        density = load_explosive(full["explosive"]).density
+        full["charge_length"] = charge_length(density, float(diameter[0]), mass)
+    return full
 
 
 def _summary(answers: list[dict[str, Any]]) -> dict[str, Any] | None:
