@@ -10,13 +10,19 @@ from castblast.surrogate.dense_models import LevenbergMlp
 from castblast.surrogate.families import seen_columns
 from castblast.surrogate.levenberg import _Net, fit_dense
 
-RNG = np.random.default_rng(0)
-ROWS = RNG.standard_normal((300, 3))
+ROWS = np.random.default_rng(0).standard_normal((300, 3))
+ROWS.flags.writeable = False
 
 
-def test_without_hidden_layer_it_is_linear_least_squares() -> None:
+@pytest.fixture
+def rng() -> np.random.Generator:
+    """Random numbers of one test: the same whatever ran before it."""
+    return np.random.default_rng(1)
+
+
+def test_without_hidden_layer_it_is_linear_least_squares(rng: np.random.Generator) -> None:
     """A line and noise: the optimum is that of the normal equations, reached in a few steps."""
-    noisy = ROWS @ np.array([1.0, -2.0, 0.5]) + 0.3 + 0.1 * RNG.standard_normal(300)
+    noisy = ROWS @ np.array([1.0, -2.0, 0.5]) + 0.3 + 0.1 * rng.standard_normal(300)
     exact, *_ = np.linalg.lstsq(np.column_stack([ROWS, np.ones(300)]), noisy, rcond=None)
     result = fit_dense(ROWS, noisy, (), "tanh", penalty=0.0, max_steps=30, tolerance=0.0, seed=0)
     np.testing.assert_allclose(result.weights, exact, atol=1e-10)
@@ -52,9 +58,9 @@ def test_normal_equations_are_those_of_finite_differences(activation: Activation
     np.testing.assert_allclose(matrix, jacobian.T @ jacobian, rtol=1e-6, atol=1e-6)
 
 
-def test_a_network_finds_the_network_that_made_the_rows() -> None:
+def test_a_network_finds_the_network_that_made_the_rows(rng: np.random.Generator) -> None:
     """Rows of a network of three tanh nodes have a fit without residual."""
-    hidden = np.tanh(ROWS @ RNG.standard_normal((3, 3)) + RNG.standard_normal(3))
+    hidden = np.tanh(ROWS @ rng.standard_normal((3, 3)) + rng.standard_normal(3))
     target = hidden @ np.array([1.0, -1.5, 0.7]) + 0.2
     model = LevenbergMlp((3,), start_iterations=300, max_iterations=1, tolerance=0.0)
     assert np.abs(model.fit(ROWS, target).predict(ROWS) - target).max() < 1e-9
@@ -70,9 +76,9 @@ def test_columns_that_a_target_must_not_see_have_no_influence() -> None:
     assert np.abs(model.predict(moved)[:, 1] - model.predict(ROWS)[:, 1]).max() > 0.1
 
 
-def test_a_start_on_few_rows_ends_where_all_rows_say() -> None:
+def test_a_start_on_few_rows_ends_where_all_rows_say(rng: np.random.Generator) -> None:
     """The last steps take all rows: the result is stationary for these."""
-    target = np.sin(ROWS[:, 0]) + 0.1 * RNG.standard_normal(300)
+    target = np.sin(ROWS[:, 0]) + 0.1 * rng.standard_normal(300)
     model = LevenbergMlp(
         (4,), start_rows=100, start_iterations=60, max_iterations=300, penalty=1e-2, tolerance=0.0
     )

@@ -32,6 +32,9 @@ _MODULES: dict[str, type[torch.nn.Module]] = {
 #: L-BFGS iterations between two looks of a watch.
 _ROUND = 50
 _HISTORY = 50
+#: A relative fall of the loss below this is rounding: there the slope need not come down to its
+#: tolerance, and L-BFGS would turn in place.
+_ROUNDING = float(np.finfo(np.float64).eps)
 
 
 @dataclass(frozen=True)
@@ -280,28 +283,36 @@ def _lbfgs(
         line_search_fn="strong_wolfe",
     )
 
+    values: list[float] = []
+
     def closure() -> torch.Tensor:
         optimizer.zero_grad()
         value = loss(inputs, targets)
         value.backward()  # type: ignore[no-untyped-call]
+        values.append(value.item())
         return value
 
-    done = 0
+    group, done = optimizer.param_groups[0], 0
     while done < schedule.max_iterations:
-        optimizer.param_groups[0]["max_iter"] = min(_ROUND, schedule.max_iterations - done)
+        group["max_iter"] = min(_ROUND, schedule.max_iterations - done)
+        values.clear()
         optimizer.step(closure)  # type: ignore[no-untyped-call]
         before, done = done, int(optimizer.state[weights[0]].get("n_iter", 0))
         look()
         slopes = [w.grad.abs().max() for w in weights if w.grad is not None]
-        if done == before or float(torch.stack(slopes).max()) <= schedule.tolerance:
+        at_floor = values[0] - min(values) <= _ROUNDING * values[0]
+        if done == before or at_floor or float(torch.stack(slopes).max()) <= schedule.tolerance:
             return Training(done, True)
+        # An iteration that gains less than this ends the round; a round that gains less, the fit.
+        # Relative to the loss reached, for the optimizer itself knows an absolute bound only.
+        group["tolerance_change"] = _ROUNDING * min(values)
     return Training(done, False)
 
 
 def _answers(module: torch.nn.Module, x: Floats) -> Floats:
     module.eval()
     with torch.no_grad():
-        values: Floats = module(torch.from_numpy(np.ascontiguousarray(x))).numpy()
+        values: Floats = module(torch.from_numpy(np.require(x, requirements=["C", "W"]))).numpy()
     return values
 
 
