@@ -56,6 +56,18 @@ def test_identical_models_cannot_be_told_apart_and_better_ones_can(fit) -> None:
         assert half == pytest.approx(0.5 * whole, rel=1e-6)
 
 
+def test_the_league_is_ranked_and_chosen_by_validation_rows_test_rows_only_report(fit) -> None:
+    """Half the error on the test rows wins nothing for a model that is worse on validation rows."""
+    league = compare(
+        [renamed(fit, "lucky", 0.5, valid=2.0), fit, renamed(fit, "unlucky", 3.0, 0.9)]
+    )
+    names = [one["name"] for one in league["league"]]
+    assert names == ["unlucky", "power_law", "lucky"]
+    assert league["chosen"] == league["best_exportable"] == league["best_overall"] == "unlucky"
+    reported = {one["name"]: one["test_error"] for one in league["league"]}
+    assert reported["lucky"] < reported["power_law"] < reported["unlucky"]
+
+
 def test_luck_of_the_rows_is_not_taken_for_skill(fit) -> None:
     """Two models whose errors are the same numbers dealt to other rows are not told apart."""
     rng = np.random.default_rng(5)

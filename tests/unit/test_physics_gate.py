@@ -9,6 +9,7 @@ from toy_physics import EXPLOSIVES, FEATURES, TARGETS, toy_domain, toy_predict
 from castblast.surrogate.domain import dataset_domain
 from castblast.surrogate.gate import Surrogate, check_physics
 from castblast.surrogate.probe import physics_probe
+from castblast.variables import VARIABLES
 
 VELOCITY = TARGETS.index("burden_velocity")
 
@@ -142,6 +143,37 @@ def test_answers_against_nature_fail(probe, target, change, rule) -> None:
     document = check_physics(surrogate(spoil), probe)
     assert rule in broken(document)
     json.dumps(document, allow_nan=False)
+
+
+@pytest.mark.parametrize(("share", "allowed"), [(0.98, True), (1.02, False)])
+def test_the_burden_before_an_inclined_face_includes_its_toe(share, allowed) -> None:
+    """Rock thrown with a little more than the heat of its charge is refused, a little less is not.
+
+    The section of the burden is a trapezium, B wide at the crest and B + H cot(face angle) at the
+    toe: without the toe its mass, and so its energy, would be several times too small.
+    """
+    domain = toy_domain(face_angle={"lower": "60 deg", "upper": "75 deg"})
+    names = (*FEATURES, "spacing", "face_angle")
+    energy = dict(zip(EXPLOSIVES, domain.energy.tolist(), strict=True))
+
+    def at_the_bound(frame):
+        answers = toy_predict(frame)
+        x = {name: frame[name].to_numpy() for name in names}
+        width = x["burden"] + x["bench_height"] / np.tan(x["face_angle"])
+        section = 0.5 * (x["burden"] + width) * x["bench_height"]
+        mass = VARIABLES["rock_density"].default * section * x["spacing"]
+        heat = np.array([energy[name] for name in frame["explosive"]])
+        heat *= 0.25 * np.pi * x["hole_diameter"] ** 2 * x["charge_length"]
+        answers[:, VELOCITY] = np.sqrt(2.0 * share * heat / mass)
+        return answers
+
+    document = check_physics(
+        Surrogate(at_the_bound, names, TARGETS), physics_probe(domain, points=64, dense=256)
+    )
+    name = "kinetic energy below the charge's"
+    check = next(check for check in document["checks"] if check["name"] == name)
+    assert check["asked"] == 256
+    assert check["broken"] == (0 if allowed else 256)
 
 
 def test_what_the_simulator_breaks_is_not_asked() -> None:

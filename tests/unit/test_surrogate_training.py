@@ -12,6 +12,7 @@ from castblast.network import domain_violations, evaluate
 from castblast.specs.model import (
     PAPER_FEATURES,
     PAPER_TARGETS,
+    CustomSpec,
     MlpSpec,
     RidgeSpec,
     read_model_spec,
@@ -19,6 +20,7 @@ from castblast.specs.model import (
 )
 from castblast.surrogate.comparison import compare
 from castblast.surrogate.features import read_table
+from castblast.surrogate.metrics import summary_error
 from castblast.surrogate.training import fit_spec, learning_curve
 
 QUICK = MlpSpec(name="quick", max_iterations=150, restarts=2, target_transform="log")
@@ -95,6 +97,28 @@ def test_the_best_start_on_validation_rows_is_kept(fit) -> None:
     assert len(fit.restarts) == 2
     assert fit.restart.valid_error == min(restart.valid_error for restart in fit.restarts)
     assert {restart.seed for restart in fit.restarts} == {0, 1}
+
+
+def test_restarts_are_chosen_on_validation_rows_never_on_training_rows(table, tmp_path) -> None:
+    """The restart that knows its training rows by heart and errs on all others is not kept."""
+    (tmp_path / "two_starts.py").write_text(
+        "from sklearn.linear_model import LinearRegression\n"
+        "from sklearn.neighbors import KNeighborsRegressor\n"
+        "def make(seed):\n"
+        "    return LinearRegression() if seed else KNeighborsRegressor(1)\n"
+    )
+    logs = {"input_transform": "log", "target_transform": "log"}
+    spec = CustomSpec(name="two", factory="two_starts:make", folder=tmp_path, restarts=2, **logs)
+    by_heart, straight = (
+        fit_spec(spec.model_copy(update={"seed": seed, "restarts": 1}), table) for seed in (0, 1)
+    )
+    errors = {
+        split: [summary_error(fit.scores(split)) for fit in (by_heart, straight)]
+        for split in ("train", "valid")
+    }
+    assert errors["train"][0] < 1e-9 < errors["train"][1]
+    assert errors["valid"][0] > 2.0 * errors["valid"][1]
+    assert fit_spec(spec, table).restart.seed == 1
 
 
 def test_reaching_the_iteration_limit_is_recorded_not_shown(table) -> None:

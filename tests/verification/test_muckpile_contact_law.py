@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from castblast.muckpile.contact import ContactLaw
+from castblast.muckpile.contact import ContactLaw, law_constants
+from castblast.muckpile.contact_step import step_contact
 from castblast.muckpile.particles import Particles, ball_mass, particles_at_rest
 from castblast.muckpile.simulation import Simulation
 from castblast.muckpile.walls import floor, plane
@@ -129,6 +130,31 @@ def test_limit_of_stability(share, stable):
     run.run(400 * share * 2.0 / W0, 9.0)
     off = abs(run.state().position[0, 2] - (R - rest))
     assert off < 1e-3 if stable else off > 0.1
+
+
+@pytest.mark.parametrize("normal", [(1.0, 0.0, 0.0), (0.6, 0.48, 0.64)])
+def test_a_loaded_contact_turns_with_partners_that_spin_together(normal):
+    """Objectivity: a rotation of the whole pair about its normal turns forces and nothing else.
+
+    Two pressed balls hold a shear force and a rolling moment and spin together by 90 degrees, in
+    2000 steps without any motion of one against the other.
+    """
+    n = np.array(normal)
+    along = np.cross(n, [0.0, 1.0, 0.0])
+    along /= np.linalg.norm(along)
+    shear = 30.0 * along
+    moment = 0.2 * along - 0.1 * np.cross(n, along)
+    constants = law_constants(LAW._replace(rolling_friction=0.5))
+    found = shear, moment
+    for _ in range(2000):
+        _, *found = step_contact(
+            constants, 0.5, 0.5, *normal, 0.01 * R, 0.5 * R, *(0.0,) * 6, 0.5 * pi / 2000.0, 1e-5,
+            *found[0], *found[1], KN, 2.0 * sqrt(0.5 * M * KN),
+        )[:3]  # fmt: skip
+    for before, after in zip((shear, moment), found, strict=True):
+        size = np.linalg.norm(before)
+        np.testing.assert_allclose(after, np.cross(n, before), rtol=0.0, atol=1e-6 * size)
+        assert np.linalg.norm(after) == pytest.approx(size, rel=1e-12)
 
 
 def on_incline(angle, mu, mu_r, time):
