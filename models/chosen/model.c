@@ -26,7 +26,14 @@ static const double codes[CASTBLAST_EXPLOSIVES][4] = {
   {0.0, 1.0, 0.0, 0.0},
   {0.0, 0.0, 1.0, 0.0},
   {0.0, 0.0, 0.0, 1.0}};
-static const double bands[CASTBLAST_OUTPUTS] = {0.0025410430049917576, 0.0028751270154272865, 0.003497496769159381, 0.0009315677087592165};
+static const double network_bands[CASTBLAST_OUTPUTS] = {0.0025410430049917576, 0.0028751270154272865, 0.003497496769159381, 0.0009315677087592165};
+/* Ends of the prediction bands over the value. prior: not calibrated on your blasts. */
+static const double prediction_bands[CASTBLAST_OUTPUTS][2] = {
+  {0.5179146043899854, 1.9308202385561777},
+  {0.5623089619002958, 1.7783817576382717},
+  {0.5179130033905284, 1.9308262072075404},
+  {0.8074837074044762, 1.2384150798711913}
+};
 static const double weights_1[22][112] = {
   {0.11082670881982451, -0.2401193105381403, 0.10359843364258438, 0.275655070085058,
      0.08129897087602982, -0.05997913953764354, 0.15601817318361402, -0.08821432731260845,
@@ -1936,12 +1943,23 @@ int castblast_explosive(const char *name) {
   return -1;
 }
 
+/* One value and its bands; below zero the ends of the prediction band change places. */
+static void set_bands(castblast_prediction *answer, int j, double value) {
+  const double half = fabs(value) * network_bands[j];
+  const int turned = value < 0.0;
+  answer->value[j] = value;
+  answer->prediction_lower[j] = value * prediction_bands[j][turned];
+  answer->prediction_upper[j] = value * prediction_bands[j][!turned];
+  answer->network_lower[j] = value - half;
+  answer->network_upper[j] = value + half;
+}
+
 int castblast_predict(int explosive, const double inputs[CASTBLAST_INPUTS],
                       castblast_prediction *answer) {
   double z[CASTBLAST_INPUTS];
   int j;
   if (explosive < 0 || explosive >= CASTBLAST_EXPLOSIVES) {
-    for (j = 0; j < CASTBLAST_OUTPUTS; ++j) answer->value[j] = answer->lower[j] = answer->upper[j] = NAN;
+    for (j = 0; j < CASTBLAST_OUTPUTS; ++j) set_bands(answer, j, NAN);
     for (j = 0; j < CASTBLAST_INPUTS; ++j) answer->offending[j] = 0;
     answer->score = NAN;
     answer->in_domain = 0;
@@ -1951,9 +1969,7 @@ int castblast_predict(int explosive, const double inputs[CASTBLAST_INPUTS],
   scale_inputs(inputs, z);
   evaluate(explosive, inputs, z, answer->value);
   for (j = 0; j < CASTBLAST_OUTPUTS; ++j) {
-    const double half = fabs(answer->value[j]) * bands[j];
-    answer->lower[j] = answer->value[j] - half;
-    answer->upper[j] = answer->value[j] + half;
+    set_bands(answer, j, answer->value[j]);
   }
   answer->domain = broken_rules(inputs, answer->offending) ? CASTBLAST_OUTSIDE : CASTBLAST_INSIDE;
   {
@@ -2992,8 +3008,10 @@ static double seconds_of(long count) {
 static void print_row(const castblast_prediction *answer) {
   int j;
   for (j = 0; j < CASTBLAST_OUTPUTS; ++j) printf("%.17g ", answer->value[j]);
-  for (j = 0; j < CASTBLAST_OUTPUTS; ++j) printf("%.17g ", answer->lower[j]);
-  for (j = 0; j < CASTBLAST_OUTPUTS; ++j) printf("%.17g ", answer->upper[j]);
+  for (j = 0; j < CASTBLAST_OUTPUTS; ++j) printf("%.17g ", answer->prediction_lower[j]);
+  for (j = 0; j < CASTBLAST_OUTPUTS; ++j) printf("%.17g ", answer->prediction_upper[j]);
+  for (j = 0; j < CASTBLAST_OUTPUTS; ++j) printf("%.17g ", answer->network_lower[j]);
+  for (j = 0; j < CASTBLAST_OUTPUTS; ++j) printf("%.17g ", answer->network_upper[j]);
   printf("%.17g %d", answer->score, answer->domain);
   for (j = 0; j < CASTBLAST_INPUTS; ++j) printf(" %d", answer->offending[j]);
   printf("\n");

@@ -2,7 +2,10 @@
  *
  * C99, no dependency beyond libm, no allocation, no state that changes: safe from any thread.
  * All quantities are in SI units, angles in radians. An answer holds only for the simulator that
- * the surrogate was trained on, and only where `domain` is CASTBLAST_INSIDE.
+ * the surrogate was trained on, and only where `domain` is CASTBLAST_INSIDE. It has two bands:
+ *
+ *   prediction  5th to 95th percentile of the blast itself; prior: not calibrated on your blasts
+ *   network     95 % of what the simulator would give; no statement about a blast
  *
  *     double inputs[CASTBLAST_INPUTS];
  *     castblast_prediction answer;
@@ -51,7 +54,7 @@ enum {
   CASTBLAST_STEMMING_LENGTH = 13 /* [m] stemming length */
 };
 
-/* Positions in `value`, `lower` and `upper` of an answer. */
+/* Positions in `value` and in the ends of the bands of an answer. */
 enum {
   CASTBLAST_EQUILIBRIUM_PRESSURE = 0, /* [Pa] gas pressure when the hole has come to rest */
   CASTBLAST_BURDEN_VELOCITY = 1, /* [m s-1] final velocity of the burden */
@@ -82,8 +85,10 @@ extern const char *const castblast_output_units[CASTBLAST_OUTPUTS];
 
 typedef struct {
   double value[CASTBLAST_OUTPUTS];
-  double lower[CASTBLAST_OUTPUTS]; /* ends of the 95 % band, meant for rows inside the domain */
-  double upper[CASTBLAST_OUTPUTS];
+  double prediction_lower[CASTBLAST_OUTPUTS]; /* where the blast is expected; NaN: not stated */
+  double prediction_upper[CASTBLAST_OUTPUTS];
+  double network_lower[CASTBLAST_OUTPUTS]; /* where the simulator is expected */
+  double network_upper[CASTBLAST_OUTPUTS]; /* both meant for rows inside the domain */
   double score;                          /* joint density, at most 1 inside; NaN: not known */
   int in_domain;                         /* 1: inside, 0: do not use the values as they are */
   int domain;                            /* CASTBLAST_INSIDE, _UNUSUAL or _OUTSIDE */

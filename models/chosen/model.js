@@ -2,7 +2,10 @@
  *
  * One ES module without dependencies, for browsers and for node. All quantities are in SI units,
  * angles in radians. An answer holds only for the simulator that the surrogate was trained on, and
- * only where `inDomain` is true.
+ * only where `inDomain` is true. It has two bands:
+ *
+ *   prediction  5th to 95th percentile of the blast itself; prior: not calibrated on your blasts
+ *   network     95 % of what the simulator would give; no statement about a blast
  *
  *     import { predict } from "./model.js";
  *     const answer = predict("anfo", {
@@ -497,7 +500,8 @@ export const network = {
       "log": true,
       "mean": 19.085790607752863,
       "scale": 0.5085669463841802,
-      "band": 0.0025410430049917576
+      "network_band": 0.0025410430049917576,
+      "prediction_band": [0.5179146043899854, 1.9308202385561777]
     },
     {
       "name": "burden_velocity",
@@ -508,7 +512,8 @@ export const network = {
       "log": true,
       "mean": 1.498321440698761,
       "scale": 0.9485571580996667,
-      "band": 0.0028751270154272865
+      "network_band": 0.0028751270154272865,
+      "prediction_band": [0.5623089619002958, 1.7783817576382717]
     },
     {
       "name": "crushed_zone_radius",
@@ -519,7 +524,8 @@ export const network = {
       "log": true,
       "mean": -0.06417952982338683,
       "scale": 0.4347087057743223,
-      "band": 0.003497496769159381
+      "network_band": 0.003497496769159381,
+      "prediction_band": [0.5179130033905284, 1.9308262072075404]
     },
     {
       "name": "expanded_hole_radius",
@@ -530,9 +536,11 @@ export const network = {
       "log": true,
       "mean": -1.7957522958330403,
       "scale": 0.38923074803849605,
-      "band": 0.0009315677087592165
+      "network_band": 0.0009315677087592165,
+      "prediction_band": [0.8074837074044762, 1.2384150798711913]
     }
   ],
+  "basis": "prior: not calibrated on your blasts",
   "rules": [
     {
       "label": "stemming length at least 0.4 burden",
@@ -1166,8 +1174,11 @@ export const network = {
 /** Names and units of the inputs, the explosives and the outputs. */
 export const inputs = network.inputs.map(({ name, unit, title, lower, upper }) => ({ name, unit, title, lower, upper }));
 export const explosives = network.explosives.slice();
-export const outputs = network.outputs.map(({ name, unit, title, band }) => ({ name, unit, title, band }));
+export const outputs = network.outputs.map(({ name, unit, title }) => ({ name, unit, title }));
+/** What the prediction bands rest on. */
+export const basis = network.basis;
 
+const unknown = [NaN, NaN];
 const inputCount = network.inputs.length;
 const outputCount = network.outputs.length;
 const codeStart = inputCount + network.derived.length;
@@ -1280,18 +1291,36 @@ function markUnusual(z, c, offending) {
   });
 }
 
+/* Ends of both bands; below zero those of the prediction band change places. */
+function bandsOf(values) {
+  const predictionLower = new Array(outputCount);
+  const predictionUpper = new Array(outputCount);
+  const networkLower = new Array(outputCount);
+  const networkUpper = new Array(outputCount);
+  for (let j = 0; j < outputCount; j += 1) {
+    const value = values[j];
+    const half = Math.abs(value) * network.outputs[j].network_band;
+    const [less, more] = network.outputs[j].prediction_band ?? unknown;
+    predictionLower[j] = value * (value < 0 ? more : less);
+    predictionUpper[j] = value * (value < 0 ? less : more);
+    networkLower[j] = value - half;
+    networkUpper[j] = value + half;
+  }
+  return { predictionLower, predictionUpper, networkLower, networkUpper };
+}
+
 /**
  * Predict one design by positions; for loops over many designs.
  * @param {number} explosive position in `explosives`
  * @param {ArrayLike<number>} row inputs in SI, in the order of `inputs`
- * @returns values, lower, upper (arrays in the order of `outputs`), score, domain
+ * @returns values, predictionLower, predictionUpper, networkLower, networkUpper (arrays in the
+ *   order of `outputs`; NaN: no band is stated), score, domain
  *   ("inside", "unusual" or "outside") and offending (an array of booleans, one per input)
  */
 export function predictRow(explosive, row) {
   if (!(explosive in network.codes)) throw new RangeError(`no explosive at position ${explosive}`);
   const z = network.inputs.map((column, i) => scaled(row[i], column));
   const values = evaluate(explosive, row, z);
-  const halves = values.map((value, j) => Math.abs(value) * network.outputs[j].band);
   const offending = new Array(inputCount).fill(false);
   let domain = brokenRules(row, offending) ? "outside" : "inside";
   const { score, nearest } = densityScore(z);
@@ -1299,16 +1328,15 @@ export function predictRow(explosive, row) {
     domain = "unusual";
     markUnusual(z, nearest, offending);
   }
-  const lower = values.map((value, j) => value - halves[j]);
-  const upper = values.map((value, j) => value + halves[j]);
-  return { values, lower, upper, score, domain, offending };
+  return { values, ...bandsOf(values), score, domain, offending };
 }
 
 /**
  * Predict one design.
  * @param {string} explosive one of `explosives`
  * @param {Object<string, number>} values every input by name, in SI
- * @returns values, lower and upper end of the 95 % band (objects by output name), inDomain,
+ * @returns values (object by output name), predictionBand and networkBand (objects by output name
+ *   of { lower, upper }; an output without a stated prior has no predictionBand), inDomain,
  *   domain ("inside", "unusual" or "outside"), offending (names of the inputs at fault) and score
  *   (joint density, at most 1 inside; null if unknown)
  * @throws {Error} an unknown explosive, a missing or unknown input, or no number; all at once
@@ -1327,11 +1355,11 @@ export function predict(explosive, values) {
   }
   if (faults.length) throw new Error(faults.join("\n"));
   const answer = predictRow(position, names.map((name) => values[name]));
-  const named = (row) => Object.fromEntries(network.outputs.map(({ name }, j) => [name, row[j]]));
+  const named = (of) => Object.fromEntries(network.outputs.map(({ name }, j) => [name, of(j)]).filter(([, entry]) => entry !== null));
   return {
-    values: named(answer.values),
-    lower: named(answer.lower),
-    upper: named(answer.upper),
+    values: named((j) => answer.values[j]),
+    predictionBand: named((j) => network.outputs[j].prediction_band && { lower: answer.predictionLower[j], upper: answer.predictionUpper[j] }),
+    networkBand: named((j) => ({ lower: answer.networkLower[j], upper: answer.networkUpper[j] })),
     inDomain: answer.domain === "inside",
     domain: answer.domain,
     offending: names.filter((_, i) => answer.offending[i]),

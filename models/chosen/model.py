@@ -3,6 +3,10 @@
 One file for CPython 3.6 and later, standard library only: it runs inside PFC, FLAC or any other
 program with an interpreter. All quantities are in SI units, angles in radians. An answer holds
 only for the simulator that the surrogate was trained on, and only where `in_domain` is true.
+Each value has two bands:
+
+    prediction_band  5th to 95th percentile of the blast itself; prior: not calibrated on your blasts
+    network_band     95 % of what the simulator would give; no statement about a blast
 
     from model import predict
     answer = predict("anfo", ucs=100000000.0, young_modulus=20000000000.0, poisson_ratio=0.25, rock_density=2600.0, friction_angle=0.7853981633974483, dilation_angle=0.0, tensile_strength=0.0, in_situ_stress=0.0, hole_diameter=0.15, burden=3.0, spacing=3.0, bench_height=12.5, face_angle=1.5707963267948966, stemming_length=2.0999999999999996)
@@ -491,7 +495,8 @@ NETWORK = json.loads(r'''{
       "log": true,
       "mean": 19.085790607752863,
       "scale": 0.5085669463841802,
-      "band": 0.0025410430049917576
+      "network_band": 0.0025410430049917576,
+      "prediction_band": [0.5179146043899854, 1.9308202385561777]
     },
     {
       "name": "burden_velocity",
@@ -502,7 +507,8 @@ NETWORK = json.loads(r'''{
       "log": true,
       "mean": 1.498321440698761,
       "scale": 0.9485571580996667,
-      "band": 0.0028751270154272865
+      "network_band": 0.0028751270154272865,
+      "prediction_band": [0.5623089619002958, 1.7783817576382717]
     },
     {
       "name": "crushed_zone_radius",
@@ -513,7 +519,8 @@ NETWORK = json.loads(r'''{
       "log": true,
       "mean": -0.06417952982338683,
       "scale": 0.4347087057743223,
-      "band": 0.003497496769159381
+      "network_band": 0.003497496769159381,
+      "prediction_band": [0.5179130033905284, 1.9308262072075404]
     },
     {
       "name": "expanded_hole_radius",
@@ -524,9 +531,11 @@ NETWORK = json.loads(r'''{
       "log": true,
       "mean": -1.7957522958330403,
       "scale": 0.38923074803849605,
-      "band": 0.0009315677087592165
+      "network_band": 0.0009315677087592165,
+      "prediction_band": [0.8074837074044762, 1.2384150798711913]
     }
   ],
+  "basis": "prior: not calibrated on your blasts",
   "rules": [
     {
       "label": "stemming length at least 0.4 burden",
@@ -1162,6 +1171,10 @@ OUTPUTS = tuple(column["name"] for column in NETWORK["outputs"])
 EXPLOSIVES = tuple(NETWORK["explosives"])
 DOMAINS = ("inside", "unusual", "outside")
 NAN = float("nan")
+# What the prediction bands rest on.
+BASIS = NETWORK["basis"]
+_BANDS = [(column["prediction_band"] or (NAN, NAN), column["network_band"])
+          for column in NETWORK["outputs"]]
 
 
 def _log(x):
@@ -1270,31 +1283,37 @@ def predict_row(explosive, row):
     """Predict one design by positions; for loops over many designs.
 
     explosive: position in EXPLOSIVES. row: inputs in SI, in the order of INPUTS.
-    Returns (values, lower, upper, score, domain, offending): lists in the order of OUTPUTS, the
+    Returns (values, prediction, network, score, domain, offending): values in the order of OUTPUTS,
+    the (lower, upper) ends of their prediction and network bands, NaN where none is stated, the
     score, a position in DOMAINS, and a list of booleans in the order of INPUTS.
     """
     if not 0 <= explosive < len(EXPLOSIVES):
         raise ValueError("no explosive at position {}".format(explosive))
     z = [_scaled(x, column) for x, column in zip(row, NETWORK["inputs"])]
     values = _evaluate(explosive, row, z)
-    halves = [abs(value) * column["band"] for value, column in zip(values, NETWORK["outputs"])]
     offending = [False] * len(INPUTS)
     domain = 2 if _broken_rules(row, offending) else 0
     score, nearest = _density_score(z)
     if domain == 0 and NETWORK["density"] is not None and not score <= 1.0:
         domain = 1
         _mark_unusual(z, nearest, offending)
-    lower = [value - half for value, half in zip(values, halves)]
-    upper = [value + half for value, half in zip(values, halves)]
-    return values, lower, upper, score, domain, offending
+    prediction, network = [], []
+    for value, ((less, more), band) in zip(values, _BANDS):
+        if value < 0.0:
+            less, more = more, less
+        prediction.append((value * less, value * more))
+        half = abs(value) * band
+        network.append((value - half, value + half))
+    return values, prediction, network, score, domain, offending
 
 
 def predict(explosive, **inputs):
     """Predict one design.
 
     explosive: one of EXPLOSIVES. inputs: every name of INPUTS with its value in SI.
-    Returns a dictionary: values, lower, upper (dictionaries by output; the ends of the 95 % band
-    are meant for designs inside the domain), in_domain, domain ("inside", "unusual", "outside"),
+    Returns a dictionary: values (by output), prediction_band and network_band (by output, each with
+    lower and upper, meant for designs inside the domain; an output without a stated prior has no
+    prediction_band), in_domain, domain ("inside", "unusual", "outside"),
     offending (names of the inputs at fault), score (joint density, at most 1 inside, or None).
     Raises ValueError with every fault: unknown explosive, missing or unknown input, no number.
     """
@@ -1310,16 +1329,24 @@ def predict(explosive, **inputs):
     if faults:
         raise ValueError("\n".join(faults))
     row = [float(inputs[name]) for name in INPUTS]
-    values, lower, upper, score, domain, offending = predict_row(EXPLOSIVES.index(explosive), row)
+    answer = predict_row(EXPLOSIVES.index(explosive), row)
+    values, prediction, network, score, domain, offending = answer
     return {
         "values": dict(zip(OUTPUTS, values)),
-        "lower": dict(zip(OUTPUTS, lower)),
-        "upper": dict(zip(OUTPUTS, upper)),
+        "prediction_band": _named(
+            (name, ends) for name, ends, column in zip(OUTPUTS, prediction, NETWORK["outputs"])
+            if column["prediction_band"]
+        ),
+        "network_band": _named(zip(OUTPUTS, network)),
         "in_domain": domain == 0,
         "domain": DOMAINS[domain],
         "offending": [name for name, flag in zip(INPUTS, offending) if flag],
         "score": None if score != score else score,
     }
+
+
+def _named(bands):
+    return {name: {"lower": lower, "upper": upper} for name, (lower, upper) in bands}
 
 
 # A bench of blocks: a CSV file with one line per block, columns `group`, `explosive`,
@@ -1412,10 +1439,11 @@ def main(arguments):
     if arguments == ["--rows"]:
         for line in sys.stdin:
             numbers = line.split()
-            values, lower, upper, score, domain, offending = predict_row(
+            values, prediction, network, score, domain, offending = predict_row(
                 int(numbers[0]), [float(x) for x in numbers[1:]]
             )
-            found = values + lower + upper + [score, domain] + [int(flag) for flag in offending]
+            ends = [band[k] for bands in (prediction, network) for k in (0, 1) for band in bands]
+            found = values + ends + [score, domain] + [int(flag) for flag in offending]
             print(" ".join(repr(x) for x in found))
         return 0
     deviation = self_test()

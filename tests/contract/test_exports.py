@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 from toy_network import toy_network
 
+from castblast.bands import BASIS, PRIORS, Prior
 from castblast.errors import CheckError, SpecError
 from castblast.export.answers import NotVerifiedError, answers
 from castblast.export.c_source import STRICT_FLAGS
@@ -27,6 +28,7 @@ from castblast.export.json_file import from_json, to_json
 from castblast.export.parity import TOLERANCE, check_parity
 from castblast.export.runners import oldest_python, run_program, written
 from castblast.export.targets import TARGETS
+from castblast.export.workbook import TOP
 from castblast.export.workbook_runner import recalculated
 from castblast.network import (
     GoldenRows,
@@ -160,7 +162,7 @@ def test_a_workbook_tells_no_time(network: Network) -> None:
         (lambda n: replace(n, density=replace(n.density, threshold=6.001)), "density score"),
         (lambda n: replace(n, constraints=()), "domain flag differs"),
         (lambda n: replace(n, outputs=(replace(n.outputs[0], relative_band=0.011), n.outputs[1])),
-         "95 % band"),
+         "network band"),
     ],
 )  # fmt: skip
 def test_a_copy_that_lost_something_is_seen(network: Network, target, change, message) -> None:
@@ -168,6 +170,33 @@ def test_a_copy_that_lost_something_is_seen(network: Network, target, change, me
     if not report.verified:
         pytest.skip(report.remark)
     assert message in "\n".join(report.faults)
+
+
+@pytest.mark.parametrize("target", ["onnx", "c", "js", "python", "excel", "web"])
+def test_a_copy_with_another_prior_is_seen(network: Network, target: str, monkeypatch) -> None:
+    """The file of another prior: its velocities carry another band, and nothing else differs."""
+    with monkeypatch.context() as changed:
+        changed.setitem(PRIORS, "burden_velocity", Prior(0.36, "another"))
+        files = TARGETS[target].write(network)
+    report = check_parity(network, target, files)
+    if not report.verified:
+        pytest.skip(report.remark)
+    assert [line.split(" deviates")[0] for line in report.faults] == ["prediction band"]
+
+
+@pytest.mark.parametrize("target", TARGET_NAMES)
+def test_a_quantity_without_a_prior_has_no_prediction_band(network: Network, target: str) -> None:
+    """Work of the gas: value and network band in every language, ends of the other one unknown."""
+    first, second = network.outputs
+    other = replace(network, outputs=(first, replace(second, name="gas_work", unit="J m-1")))
+    report = parity(target, other)
+    assert report.passed, report.faults
+    golden = other.golden
+    index = np.array([explosive_index(other, name) for name in golden.explosives])
+    found = run(target, other, golden.inputs, index)
+    assert np.isnan(found.prediction.lower[:, 1]).all()
+    assert np.isfinite(found.prediction.lower[:, 0]).all()
+    assert np.isfinite(found.network.upper).all()
 
 
 # C
@@ -264,7 +293,12 @@ def test_python_predicts_by_name(network: Network, module: dict) -> None:
     row = np.array([[design[name] for name in network.input_names]])
     truth = answers(network, row, np.array([1]))
     np.testing.assert_allclose(list(answer["values"].values()), truth.values[0], rtol=1e-12)
-    np.testing.assert_allclose(list(answer["upper"].values()), truth.upper[0], rtol=1e-12)
+    for kind in ("prediction", "network"):
+        ends = getattr(truth, kind)
+        for j, name in enumerate(network.output_names):
+            found = answer[f"{kind}_band"][name]
+            assert found["lower"] == pytest.approx(ends.lower[0, j], rel=1e-12)
+            assert found["upper"] == pytest.approx(ends.upper[0, j], rel=1e-12)
     assert answer["in_domain"] == truth.inside[0]
     wide = module["predict"]("anfo", **(design | {"burden": 50.0}))
     assert wide["domain"] == "outside"
@@ -297,7 +331,12 @@ def test_javascript_predicts_by_name(network: Network) -> None:
     assert wide["offending"] == ["bench_height", "burden"]
     truth = answers(network, np.array([[12.0, 5.0, 50.0]]), np.array([0]))
     np.testing.assert_allclose(list(wide["values"].values()), truth.values[0], rtol=1e-12)
-    np.testing.assert_allclose(list(wide["lower"].values()), truth.lower[0], rtol=1e-12)
+    for kind in ("prediction", "network"):
+        ends = getattr(truth, kind)
+        for j, name in enumerate(network.output_names):
+            found = wide[f"{kind}Band"][name]
+            assert found["lower"] == pytest.approx(ends.lower[0, j], rel=1e-12)
+            assert found["upper"] == pytest.approx(ends.upper[0, j], rel=1e-12)
     assert deviation <= TOLERANCE
     assert names == list(network.input_names)
     for words in ("known are anfo", "bench_height: not a number", "burden: missing", "burdn: no"):
@@ -410,6 +449,21 @@ def test_workbook_answers_what_is_typed(network: Network) -> None:
     assert (lower, upper, unit) == ("unknown", "unknown", "m s-1")
 
 
+def test_a_workbook_says_which_band_is_which(network: Network) -> None:
+    """Both bands stand on Predict, each under its name, and point at the columns of that name."""
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.load_workbook(BytesIO(TARGETS["excel"].write(network)["model.xlsx"]))
+    lines = {row[0].value: row for row in book["Predict"].iter_rows() if row[0].value}
+    assert any(BASIS in str(text) for text in lines)
+    heads = {cell.value: cell.column_letter for cell in book["Working"][TOP - 1]}
+    row = lines["final velocity of the burden"]
+    titles = ("value", "prediction lower", "prediction upper", None, "network lower",
+              "network upper")  # fmt: skip
+    for cell, title in zip(row[1:], titles, strict=True):
+        if title is not None:
+            assert f"Working!${heads[title]}${TOP}*" in cell.value
+
+
 def test_lookup_table_holds_answers_of_the_network(network: Network) -> None:
     lines = list(
         csv.DictReader(TARGETS["excel"].write(network)["lookup.csv"].decode().splitlines())
@@ -422,6 +476,8 @@ def test_lookup_table_holds_answers_of_the_network(network: Network) -> None:
         truth = answers(network, row, index)
         found = float(line["burden_velocity [m s-1]"])
         assert found == pytest.approx(truth.values[0, 0], rel=1e-3)  # six figures in the table
+        upper = float(line["burden_velocity_prediction_upper [m s-1]"])
+        assert upper == pytest.approx(truth.prediction.upper[0, 0], rel=1e-3)
 
 
 # the verb

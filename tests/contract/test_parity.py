@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from castblast.bands import BASIS, PRIORS
 from castblast.errors import CheckError, SpecError
 from castblast.export.json_file import to_json
 from castblast.export.onnx_file import OPSET, run_onnx, to_onnx
@@ -120,7 +121,10 @@ def test_onnx_is_float64_old_enough_and_takes_any_batch(network: Network) -> Non
     assert model.ir_version <= 8
     assert not any(tensor.data_type == onnx.TensorProto.FLOAT for tensor in model.graph.initializer)
     names = list(network.output_names)
-    ends = [f"{name}_{end}" for end in ("lower", "upper") for name in names]
+    ends = [
+        f"{name}_{kind}_{end}"
+        for kind in ("prediction", "network") for end in ("lower", "upper") for name in names
+    ]  # fmt: skip
     found = [entry.name for entry in model.graph.output]
     assert found == [*names, *ends, "domain_score", "in_domain", "offending"]
     for rows in (1, 3):
@@ -132,6 +136,8 @@ def test_onnx_is_float64_old_enough_and_takes_any_batch(network: Network) -> Non
     assert metadata["inputs"] == list(network.input_names)
     assert metadata["input_upper"] == [column.upper for column in network.inputs]
     assert metadata["relative_band"] == [column.relative_band for column in network.outputs]
+    assert metadata["prediction_sd_of_ln"] == [PRIORS[name].sd for name in names]
+    assert metadata["prediction_basis"] == BASIS
 
 
 def test_an_export_that_disagrees_is_not_written(network: Network, tmp_path: Path) -> None:

@@ -66,7 +66,7 @@ def test_spread_in_onnx(network: Network) -> None:
             lambda n: replace(
                 n, outputs=(replace(n.outputs[0], relative_band=0.011), n.outputs[1])
             ),
-            "95 % band",
+            "network band",
         ),
         (lambda n: replace(n, derived=(replace(n.derived[0], mean=2.0 + 1e-8),)), "deviates"),
     ],

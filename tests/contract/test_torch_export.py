@@ -144,7 +144,8 @@ def test_a_module_of_any_shape_is_the_estimator(
     found = outcome.document["parity"]["onnx"]
     assert found["passed"]
     assert found["golden_rows"] == 200
-    assert max(*found["relative"].values(), found["band"]) <= TOLERANCE
+    bands = found["band"], found["prediction_band"]
+    assert max(*found["relative"].values(), *bands) <= TOLERANCE
     content, shell = (tmp_path / "model.onnx").read_bytes(), fit.shell()
     model = onnx.load_from_string(content)
     assert [entry.version for entry in model.opset_import] == [opset]
@@ -165,7 +166,10 @@ def test_the_file_is_like_that_of_a_network(make: Make, tmp_path: Path) -> None:
     content, shell = (tmp_path / "model.onnx").read_bytes(), fit.shell()
     model = onnx.load_from_string(content)
     names = list(shell.output_names)
-    ends = [f"{name}_{end}" for end in ("lower", "upper") for name in names]
+    ends = [
+        f"{name}_{kind}_{end}"
+        for kind in ("prediction", "network") for end in ("lower", "upper") for name in names
+    ]  # fmt: skip
     assert [entry.name for entry in model.graph.input] == ["numeric", "explosive"]
     found = [entry.name for entry in model.graph.output]
     assert found == [*names, *ends, "domain_score", "in_domain", "offending"]
@@ -259,7 +263,7 @@ def test_a_file_of_another_model_is_seen(make: Make) -> None:
     content = wrap_onnx(shell, torch_core(fit))
     assert check_wrapped_parity(shell, content).passed
     report = check_wrapped_parity(replace(shell, golden=golden), content)
-    assert len(report.faults) == len(shell.outputs) + 1
+    assert len(report.faults) == len(shell.outputs) + 2  # both bands
 
 
 def test_a_core_of_other_columns_is_refused(make: Make) -> None:

@@ -6,17 +6,23 @@ record can be held against that law.
 
 import json
 import re
+import shutil
 from html.parser import HTMLParser
-from math import log, pi
+from math import exp, log, pi
+from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
 from toy_network import toy_network
 
+from castblast.bands import BASIS, THROW_FACTOR, THROW_SD
 from castblast.errors import SpecError
 from castblast.export.parity import check_parity
+from castblast.export.runners import run_program, written
 from castblast.export.web import PAGE, to_web
+from castblast.muckpile.ballistic import block_throw
+from castblast.network import Network, predict_rows
 from castblast.resources import resource
 from castblast.stages.export import export
 from castblast.stages.web import build_page, shipped_page
@@ -73,6 +79,70 @@ def test_the_model_in_the_page_gives_the_golden_answers() -> None:
     if not report.verified:
         pytest.skip(report.remark)
     assert report.passed, report.faults
+
+
+def in_node(network: Network, script: str) -> Any:
+    """Run a script with the model and the scripts of the page that draw nothing; its JSON back."""
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("node is not installed")
+    text = to_web(network)[PAGE].decode().split('<script type="module">')[1]
+    # Before the controls nothing asks for a document until it is called.
+    computing = text.split("/* Explosive tabs, sliders and number fields. */")[0]
+    program = computing.replace("<\\/", "</") + script
+    with written({"page.mjs": program.encode()}) as folder:
+        return json.loads(run_program([node, folder / "page.mjs"]))
+
+
+def test_the_page_shows_the_bands_of_python() -> None:
+    """Values and prediction bands of tiles and batch; the throw is free flight times its factor."""
+    network = toy_network()
+    design = {"bench_height": 12.0, "charge_length": 5.0, "burden": 2.0}
+    rows, batch = in_node(
+        network,
+        f"""
+        const design = {{ explosive: "heavy_anfo", values: {json.dumps(design)} }};
+        const {{ header, rows }} = answerBatch(batchTemplate(design));
+        const of = Object.fromEntries(header.map((head, i) => [head, rows[1][i]]));
+        console.log(JSON.stringify([resultsOf(design).rows, of]));
+        """,
+    )
+    tiles = {row["key"]: row for row in rows}
+    numeric = np.array([[design[name] for name in network.input_names]])
+    truth = predict_rows(network, numeric, np.array([1]))
+    for j, (name, unit) in enumerate((c.name, c.unit) for c in network.outputs):
+        wanted = truth.values[0, j], *(end[0, j] for end in truth.prediction)
+        assert [tiles[name][key] for key in ("value", "lower", "upper")] == pytest.approx(wanted)
+        heads = f"{name} [{unit}]", *(
+            f"{name}_prediction_{end} [{unit}]" for end in ("lower", "upper")
+        )  # fmt: skip
+        assert [batch[head] for head in heads] == pytest.approx(wanted)
+    thrown, speed = tiles["throw_distance"], truth.values[0, 0]
+    flight = block_throw(speed, 12.0)
+    assert thrown["flight"] == pytest.approx(flight)
+    assert thrown["value"] == pytest.approx(1.62 * flight)
+    spread = log(thrown["upper"] / thrown["value"]) / 1.6448536
+    own = network.outputs[0].relative_band / 1.959964
+    assert spread**2 == pytest.approx(0.35**2 + 0.25**2 + own**2, rel=1e-6)
+    heads = [f"throw_distance{end} [m]" for end in ("", "_prediction_lower", "_prediction_upper")]
+    assert [batch[head] for head in heads] == [thrown[k] for k in ("value", "lower", "upper")]
+
+
+def test_the_throw_holds_that_of_the_simulated_bench() -> None:
+    """A bench 24 m high thrown at 12 m/s: 26.0 m simulated, and the page is surer than a factor 2.
+
+    Throw of a slice 24 m wide of 800 balls, face of 70 degrees; free flight alone is 17.7 m.
+    """
+    thrown = THROW_FACTOR * block_throw(12.0, 24.0)
+    own = exp(1.6448536 * THROW_SD)
+    assert thrown / own < 26.0 < thrown * own
+    assert own < 2.0
+
+
+def test_the_page_says_what_its_bands_are(page: str) -> None:
+    assert BASIS in page
+    assert "not validated" in page
+    assert "network band" in page
 
 
 def test_text_from_outside_cannot_end_the_script() -> None:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.network import Floats, Network, offending_inputs, predict_rows
+from castblast.network import Bounds, Floats, Network, offending_inputs, predict_rows
 
 
 class NotVerifiedError(Exception):
@@ -19,8 +19,11 @@ class Answers(NamedTuple):
 
     Attributes
     ----------
-    values, lower, upper : (n, m) [SI]
-        Prediction and ends of its 95 % band.
+    values : (n, m) [SI]
+    prediction : Bounds
+        Ends of the prediction bands (`castblast.bands`), NaN where no prior is stated.
+    network : Bounds
+        Ends of the 95 % bands of the network.
     score : (n,)
         Joint density score, NaN if the network has none.
     inside : (n,) bool
@@ -30,8 +33,8 @@ class Answers(NamedTuple):
     """
 
     values: Floats
-    lower: Floats
-    upper: Floats
+    prediction: Bounds
+    network: Bounds
     score: Floats
     inside: NDArray[np.bool_]
     offending: NDArray[np.bool_]
@@ -39,18 +42,21 @@ class Answers(NamedTuple):
 
 def answers(network: Network, numeric: Floats, index: NDArray[np.int64]) -> Answers:
     """Answer rows with the network itself: what every copy is held against."""
-    row = predict_rows(network, numeric, index)
-    offending = offending_inputs(network, numeric)
-    return Answers(row.values, *row.network, row.score, row.inside, offending)
+    return Answers(*predict_rows(network, numeric, index), offending_inputs(network, numeric))
 
 
 def parse_answers(text: str, inputs: int) -> Answers:
-    """Read the lines that self-tests print: values, lower, upper, score, domain, flags."""
+    """Read the lines that self-tests print.
+
+    Values; lower and upper ends of the prediction bands, then of the network bands; score; domain;
+    flags.
+    """
     table = np.array([line.split() for line in text.splitlines()], dtype=np.float64)
-    outputs = (table.shape[1] - inputs - 2) // 3
-    values, lower, upper = (table[:, j * outputs : (j + 1) * outputs] for j in range(3))
-    score, domain = table[:, 3 * outputs], table[:, 3 * outputs + 1]
-    return Answers(values, lower, upper, score, domain == 0.0, table[:, 3 * outputs + 2 :] != 0.0)
+    m = (table.shape[1] - inputs - 2) // 5
+    values, *ends = (table[:, j * m : (j + 1) * m] for j in range(5))
+    score, domain, flags = table[:, 5 * m], table[:, 5 * m + 1], table[:, 5 * m + 2 :]
+    bands = Bounds(*ends[:2]), Bounds(*ends[2:])
+    return Answers(values, *bands, score, domain == 0.0, flags != 0.0)
 
 
 def row_lines(numeric: Floats, index: NDArray[np.int64]) -> str:

@@ -9,11 +9,13 @@ load in runtimes since 2021.
 
 Inputs: ``numeric`` float64 [n, k] in SI, columns in the order of the metadata entry ``inputs``;
 ``explosive`` int64 [n], positions in the entry ``explosives``. Outputs, all [n], SI: one float64
-per output under its own name; the ends of its 95 % band, ``NAME_lower`` and ``NAME_upper``; for a
-network with members ``NAME_spread``, their relative standard deviation; ``domain_score`` float64,
-at most 1 inside the joint density of the training rows (NaN without one); ``in_domain`` bool, box,
-rules and density together; ``offending`` bool [n, k], the inputs at fault where it is false. The
-metadata carry units, domain box, rules, density and bands.
+per output under its own name; the ends of its prediction band (`castblast.bands`, NaN where no
+prior is stated), ``NAME_prediction_lower`` and ``_upper``, and of the 95 % band of the network,
+``NAME_network_lower`` and ``_upper``; for a network with members ``NAME_spread``, their relative
+standard deviation; ``domain_score`` float64, at most 1 inside the joint density of the training
+rows (NaN without one); ``in_domain`` bool, box, rules and density together; ``offending`` bool
+[n, k], the inputs at fault where it is false. The metadata carry units, domain box, rules, density
+and what both bands rest on.
 """
 
 from __future__ import annotations
@@ -25,23 +27,28 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from castblast.bands import BASIS, prior_sd
 from castblast.errors import CheckError
 from castblast.export.answers import Answers
 from castblast.export.onnx_core import OPSET, add_core
 from castblast.export.onnx_graph import Graph, values_of
 from castblast.network import (
     BLAME,
+    Bounds,
     DensityScore,
     Floats,
     Layer,
     Network,
     Shell,
     derived_matrix,
+    prediction_factors,
 )
 
 _IR_VERSION = 7
 #: Code of float64 in ONNX, for `Cast`.
 _DOUBLE = 11
+#: What the name of an output is followed by, in the order of the ends of `Answers`.
+_ENDS = ("_prediction_lower", "_prediction_upper", "_network_lower", "_network_upper")
 
 
 def to_onnx(network: Network) -> bytes:
@@ -142,7 +149,7 @@ def _finished(graph: Graph, shell: Shell, opset: int, *, spread: bool = False) -
 
 def _result_names(shell: Shell, spread: bool) -> list[str]:
     """Float64 outputs in their order."""
-    endings = ["", "_lower", "_upper", *(["_spread"] if spread else [])]
+    endings = ["", *_ENDS, *(["_spread"] if spread else [])]
     names = [f"{name}{ending}" for ending in endings for name in shell.output_names]
     return [*names, "domain_score"]
 
@@ -153,9 +160,15 @@ def _add_values(graph: Graph, values: str, shell: Shell) -> None:
     band = graph.constant("relative_band", values_of(shell.outputs, "relative_band"))
     magnitude = graph.add("Abs", "magnitudes", values)
     half = graph.add("Mul", "half_widths", magnitude, band)
-    for operator, ending in (("Sub", "lower"), ("Add", "upper")):
-        x = graph.add(operator, f"all_{ending}", values, half)
-        graph.columns(x, [f"{name}_{ending}" for name in shell.output_names])
+    less, more = (
+        graph.add("Mul", f"value_times_{word}", values, graph.constant(word, np.array(factors)))
+        for word, factors in zip(("less", "more"), zip(*prediction_factors(shell), strict=True),
+                                 strict=True)
+    )  # fmt: skip
+    parts = ("Min", less, more), ("Max", less, more), ("Sub", values, half), ("Add", values, half)
+    for ending, (operator, one, other) in zip(_ENDS, parts, strict=True):
+        x = graph.add(operator, f"all{ending}", one, other)
+        graph.columns(x, [f"{name}{ending}" for name in shell.output_names])
 
 
 def _add_spread(graph: Graph, values: str, others: Sequence[str], shell: Shell) -> None:
@@ -274,6 +287,8 @@ def _metadata(shell: Shell) -> dict[str, str]:
         "density": shell.density
         and {"threshold": shell.density.threshold, "level": shell.density.level},
         "relative_band": [column.relative_band for column in shell.outputs],
+        "prediction_sd_of_ln": [prior_sd(name) for name in shell.output_names],
+        "prediction_basis": BASIS,
         "provenance": dict(shell.provenance),
     }
     return {key: json.dumps(value) for key, value in entries.items()}
@@ -321,13 +336,13 @@ def run_onnx_rows(model: bytes, numeric: Floats, index: NDArray[np.int64]) -> An
         message = f"the file does not answer {len(numeric)} rows, only a number fixed in it"
         raise CheckError(message)
     found = dict(zip(names, columns, strict=True))
-    outputs = [name.removesuffix("_lower") for name in names if name.endswith("_lower")]
-    values, lower, upper = (
-        np.stack([found[f"{name}{ending}"] for name in outputs], axis=1)
-        for ending in ("", "_lower", "_upper")
+    outputs = [name.removesuffix(_ENDS[0]) for name in names if name.endswith(_ENDS[0])]
+    values, *ends = (
+        np.stack([found[f"{name}{ending}"] for name in outputs], axis=1) for ending in ("", *_ENDS)
     )
+    bands = Bounds(*ends[:2]), Bounds(*ends[2:])
     score, inside, offending = (found[name] for name in ("domain_score", "in_domain", "offending"))
-    return Answers(values, lower, upper, score, inside, offending)
+    return Answers(values, *bands, score, inside, offending)
 
 
 def _reference_columns(

@@ -19,13 +19,16 @@ from castblast.export.onnx_file import run_onnx_rows
 from castblast.export.plain import Files
 from castblast.export.targets import TARGETS
 from castblast.network import (
+    Bounds,
     Floats,
     Network,
     Shell,
     density_score,
     explosive_index,
     in_domain,
+    network_bounds,
     offending_inputs,
+    prediction_bounds,
 )
 
 #: Largest relative deviation allowed for a float64 export.
@@ -48,11 +51,12 @@ class ParityReport:
         Largest deviations. The relative one is over the larger of the value and the standard
         deviation of the golden answers: near a zero of the output only rounding is left.
     tolerance : float
-        Bound on `relative` and `band`.
+        Bound on `relative` and both bands.
     remark : str
         Why the export was not run, if it was not.
-    band : float
-        Largest deviation of the ends of the 95 % bands, relative as above.
+    band, prediction_band : float
+        Largest deviation of the ends of the network bands and of the prediction bands, relative as
+        above; an end that should be unknown and is not, or the other way round, counts as infinite.
     score : float
         Largest deviation of the density score, over the larger of the score and 1.
     flags : int
@@ -70,6 +74,7 @@ class ParityReport:
     tolerance: float = TOLERANCE
     remark: str = ""
     band: float = 0.0
+    prediction_band: float = 0.0
     score: float = 0.0
     flags: int = 0
     names: int = 0
@@ -89,7 +94,8 @@ class ParityReport:
     def faults(self) -> list[str]:
         """Every deviation beyond its bound, one line each; NaN is beyond."""
         bounds = {name: (value, self.tolerance) for name, value in self.relative.items()}
-        bounds["95 % band"] = (self.band, self.tolerance)
+        bounds["network band"] = (self.band, self.tolerance)
+        bounds["prediction band"] = (self.prediction_band, self.tolerance)
         bounds["density score"] = (self.score, SCORE_TOLERANCE)
         lines = [
             f"{name} deviates by {value:.3g} relative, allowed is {bound:g}"
@@ -105,7 +111,9 @@ class ParityReport:
     @property
     def largest(self) -> float:
         """Largest relative deviation of values and bands; NaN if not run."""
-        return max(self.band, *self.relative.values()) if self.verified else float("nan")
+        if not self.verified:
+            return float("nan")
+        return max(self.band, self.prediction_band, *self.relative.values())
 
     def to_document(self) -> dict[str, Any]:
         """Give the report as plain JSON values."""
@@ -118,6 +126,7 @@ class ParityReport:
             "absolute": dict(self.absolute),
             "relative": dict(self.relative),
             "band": self.band,
+            "prediction_band": self.prediction_band,
             "density_score": self.score,
             "flags_that_differ": self.flags,
             "names_that_differ": self.names,
@@ -172,8 +181,6 @@ def compare_outputs(shell: Shell, target: str, found: Answers) -> ParityReport:
     truth, names = shell.golden.outputs, shell.output_names
     deviation = np.abs(found.values - truth)
     size = np.maximum(np.abs(truth), np.std(truth, axis=0))
-    half = np.abs(truth) * np.array([column.relative_band for column in shell.outputs])
-    band = np.maximum(np.abs(found.lower - (truth - half)), np.abs(found.upper - (truth + half)))
     score = density_score(shell, shell.golden.inputs)
     drift = np.abs(found.score - score) / np.maximum(score, 1.0)
     inside = in_domain(shell, shell.golden.inputs)
@@ -183,8 +190,24 @@ def compare_outputs(shell: Shell, target: str, found: Answers) -> ParityReport:
         len(truth),
         dict(zip(names, deviation.max(axis=0).tolist(), strict=True)),
         dict(zip(names, (deviation / size).max(axis=0).tolist(), strict=True)),
-        band=float((band / size).max()),
+        band=_band_deviation(found.network, network_bounds(shell, truth), size),
+        prediction_band=_band_deviation(found.prediction, prediction_bounds(shell, truth), size),
         score=0.0 if shell.density is None else float(drift.max()),
         flags=int(np.count_nonzero(found.inside != inside)),
         names=int(np.count_nonzero(np.any(found.offending != offending, axis=1))),
     )
+
+
+def _band_deviation(found: Bounds, truth: Bounds, size: Floats) -> float:
+    """Largest deviation of both ends, over the larger of end and size of the output.
+
+    Infinite where only one side is unknown.
+    """
+    largest = 0.0
+    for end, true in zip(found, truth, strict=True):
+        unknown = np.isnan(true)
+        if (np.isnan(end) != unknown).any():
+            return float("inf")
+        deviation = np.abs(end - true) / np.fmax(np.abs(true), size)
+        largest = max(largest, float(np.max(deviation, where=~unknown, initial=0.0)))
+    return largest

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from math import isnan
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from castblast.bands import BASIS
 from castblast.design import resolve_design
 from castblast.export.json_file import pretty
 from castblast.network import (
@@ -24,6 +26,7 @@ from castblast.network import (
     density_score,
     explosive_index,
     in_domain,
+    prediction_factors,
 )
 from castblast.variables import VARIABLES
 
@@ -55,7 +58,8 @@ def compact(network: Network) -> dict[str, Any]:
         "explosives": list(network.explosives),
         "codes": network.codes.tolist(),
         "layers": [_layer(layer) for layer in network.layers],
-        "outputs": [_column(c) | {"band": c.relative_band} for c in network.outputs],
+        "outputs": _outputs(network),
+        "basis": BASIS,
         "rules": [
             {
                 "label": rule.label,
@@ -107,6 +111,19 @@ def _column(column: Column) -> dict[str, Any]:
         "mean": float(column.mean),
         "scale": float(column.scale),
     }
+
+
+def _outputs(network: Network) -> list[dict[str, Any]]:
+    """Columns with their bands: relative half-width of the network, ends over value of a blast."""
+    return [
+        _column(column)
+        | {
+            "network_band": column.relative_band,
+            # No number of JSON stands for "not stated".
+            "prediction_band": None if isnan(ends[0]) else list(ends),
+        }
+        for column, ends in zip(network.outputs, prediction_factors(network), strict=True)
+    ]
 
 
 def _layer(layer: Layer) -> dict[str, Any]:

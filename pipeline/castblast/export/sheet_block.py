@@ -8,11 +8,12 @@ twenty years knows: MMULT, TANH, EXP, LN, IF, MIN, MAX.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isnan
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from castblast.network import BLAME, Column, Constraint, Floats, Network
+from castblast.network import BLAME, Column, Constraint, Floats, Network, prediction_factors
 
 if TYPE_CHECKING:
     from openpyxl.worksheet.worksheet import Worksheet
@@ -22,8 +23,10 @@ class Block(NamedTuple):
     """Where the answers of a block stand on its sheet: first column of each part, 1-based."""
 
     values: int
-    lower: int
-    upper: int
+    prediction_lower: int
+    prediction_upper: int
+    network_lower: int
+    network_upper: int
     score: int
     domain: int
     offending: int
@@ -122,11 +125,38 @@ def write_block(
     first = writer.column
     values = writer.array("value", m, f"IF({logged}=1,EXP({plain}),{plain})")
     band = _row(constants, "relative band", network.outputs, "relative_band")
-    writer.array("lower", m, f"{values}-ABS({values})*{band}")
-    writer.array("upper", m, f"{values}+ABS({values})*{band}")
+    less, more = _prediction_factors(network, constants)
+    for title, below, above in (("lower", more, less), ("upper", less, more)):
+        ends = f"IF({values}<0,{values}*{below},{values}*{above})"
+        writer.array(f"prediction {title}", m, ends)
+    writer.array("network lower", m, f"{values}-ABS({values})*{band}")
+    writer.array("network upper", m, f"{values}+ABS({values})*{band}")
     hard, any_hard = _faults(network, constants, writer, x)
     score, domain, offending = _domain(network, constants, writer, scaled, hard, any_hard)
-    return Block(first, first + m, first + 2 * m, score, domain, offending, writer.column)
+    return Block(
+        values=first,
+        prediction_lower=first + m,
+        prediction_upper=first + 2 * m,
+        network_lower=first + 3 * m,
+        network_upper=first + 4 * m,
+        score=score,
+        domain=domain,
+        offending=offending,
+        end=writer.column,
+    )
+
+
+def _prediction_factors(network: Network, constants: Constants) -> tuple[str, str]:
+    """Addresses of the ends of the prediction bands over the value; NA() where none is stated."""
+    less, more = (
+        constants.place(title, [["=NA()" if isnan(factor) else factor for factor in factors]])
+        for title, factors in zip(
+            ("prediction lower over value", "prediction upper over value"),
+            zip(*prediction_factors(network), strict=True),
+            strict=True,
+        )
+    )
+    return less, more
 
 
 def _features(network: Network, constants: Constants, writer: _Writer, x: str) -> tuple[str, str]:

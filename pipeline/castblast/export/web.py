@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from castblast.bands import THROW_FACTOR, THROW_SD, throw_band_factor
 from castblast.errors import SpecError
 from castblast.export.answers import Answers
 from castblast.export.javascript import to_javascript
@@ -50,6 +51,7 @@ def to_web(network: Network, histories: Mapping[str, Any] | None = None) -> File
         "web/page.html.j2",
         n=compact(network),
         held=_held_lines(network),
+        throw={"factor": THROW_FACTOR, "sd": THROW_SD},
         css=(_FOLDER / "page.css").read_text(encoding="utf-8"),
         # A script ends at the first such tag, wherever it stands.
         script=script.replace("</", "<\\/"),
@@ -78,6 +80,7 @@ def _facts(network: Network, histories: Mapping[str, Any] | None) -> dict[str, A
         "held": {name: value for name, value in held.items() if name in VARIABLES},
         "defaults": {n: v.default for n, v in VARIABLES.items() if v.default is not None},
         "stemmingRatio": STEMMING_RATIO,
+        "throw": _throw(network),
         "variables": {
             name: {
                 "title": v.long_name.split(";")[0],
@@ -93,6 +96,15 @@ def _facts(network: Network, histories: Mapping[str, Any] | None) -> dict[str, A
         "scores": network.provenance.get("scores", {}).get("test", {}),
         "histories": histories,
     }
+
+
+def _throw(network: Network) -> dict[str, float] | None:
+    """Throw over free flight, and the ends of its prediction band over the throw."""
+    bands = {column.name: column.relative_band for column in network.outputs}
+    if "burden_velocity" not in bands:
+        return None
+    factor = throw_band_factor(bands["burden_velocity"])
+    return {"factor": THROW_FACTOR, "less": 1.0 / factor, "more": factor}
 
 
 def _held_lines(network: Network) -> list[str]:

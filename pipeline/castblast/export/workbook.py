@@ -1,6 +1,6 @@
 """`Network` to a workbook with live formulas, and to a lookup table.
 
-`model.xlsx`: sheet Predict takes one design in usual units and shows values, 95 % bands and the
+`model.xlsx`: sheet Predict takes one design in usual units and shows values, both bands and the
 domain; Working holds its formulas, Network the numbers, Check the golden rows through the same
 formulas. `lookup.csv`: answers over a grid, for those who may not open a workbook.
 """
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from castblast.bands import BAND_WORDS
 from castblast.export.lookup import lookup_csv
 from castblast.export.plain import Files, compact
 from castblast.export.sheet_block import Block, Constants, letter, span, write_block
@@ -119,12 +120,12 @@ def _predict(network: Network, sheet: Worksheet, block: Block) -> None:
     sheet.cell(bottom + 2, 2, "=TRIM(" + "&".join(texts) + ")")
     _results(document, sheet, block, bottom + 4, state)
     _colours(sheet, state)
-    last = bottom + 6 + len(document["outputs"])
+    last = bottom + 8 + len(document["outputs"])
     sheet.cell(last, 1, "Self-check: largest relative deviation on the golden rows")
     sheet.cell(last, 2, "=Check!$B$1").number_format = "0.0E+00"
     sheet.page_setup.orientation = "landscape"
     sheet.page_setup.fitToHeight = 0
-    for column, width in zip("ABCDEF", (62, 20, 20, 20, 12, 16), strict=True):
+    for column, width in zip("ABCDEFG", (62, 20, 20, 20, 12, 16, 16), strict=True):
         sheet.column_dimensions[column].width = width
 
 
@@ -170,18 +171,28 @@ def _results(
 ) -> None:
     from openpyxl.styles import Font
 
-    for i, head in enumerate(("Result", "Value", "95 % from", "to", "Unit"), 1):
+    heads = ("Result", "Value", "Prediction from", "to", "Unit", "Network from", "to")
+    for i, head in enumerate(heads, 1):
         sheet.cell(top, i, head).font = Font(name="Calibri", bold=True)
+    starts = (
+        (2, block.values), (3, block.prediction_lower), (4, block.prediction_upper),
+        (6, block.network_lower), (7, block.network_upper),
+    )  # fmt: skip
     for j, column in enumerate(document["outputs"]):
         row, factor = top + 1 + j, column["shown_factor"]
         sheet.cell(row, 1, column["title"])
-        for i, start in enumerate((block.values, block.lower, block.upper), 2):
+        for i, start in starts:
             cell = f"Working!${letter(start + j)}${TOP}*{factor!r}"
-            text = f'IFERROR({cell},"no value")'
+            text = f'IFERROR({cell},"{"no value" if i == 2 else "not stated"}")'
             if i > 2:
                 text = f'IF({state}="outside","unknown",{text})'
             sheet.cell(row, i, f"={text}").number_format = "0.0000"
         sheet.cell(row, 5, column["shown_unit"])
+    bottom = top + 1 + len(document["outputs"])
+    sheet.cell(bottom, 1, f"{BAND_WORDS[0].upper()}{BAND_WORDS[1:]}.")
+    sheet.cell(
+        bottom + 1, 1, "Network band: 95 % of what the simulator would give; not of a blast."
+    )
 
 
 def _colours(sheet: Worksheet, state: str) -> None:

@@ -13,7 +13,7 @@ from castblast.export.answers import Answers, NotVerifiedError, answers
 from castblast.export.plain import Files
 from castblast.export.runners import Index, run_program, written
 from castblast.export.workbook import TOP
-from castblast.network import Floats, Network
+from castblast.network import Bounds, Floats, Network
 
 
 def run_excel(network: Network, files: Files, numeric: Floats, index: Index) -> tuple[Answers, str]:
@@ -32,7 +32,8 @@ def run_excel(network: Network, files: Files, numeric: Floats, index: Index) -> 
     design = working[:, 1 : k + 1]
     truth = answers(network, design, (working[:, 0] - 1.0).astype(np.int64))
     shown = _read(working, start, k, m)
-    if not np.allclose(shown.values, truth.values, rtol=1e-12, atol=0.0):
+    parts = zip((shown.values, *shown.prediction), (truth.values, *truth.prediction), strict=True)
+    if not all(np.allclose(*pair, rtol=1e-12, atol=0.0, equal_nan=True) for pair in parts):
         message = "sheet Predict does not give the answer of the network for its design"
         raise CheckError(message)
     return found, "LibreOffice"
@@ -74,9 +75,9 @@ def _starts(sheet: Any) -> dict[str, int]:
 
 
 def _read(table: Floats, start: dict[str, int], k: int, m: int) -> Answers:
-    values, lower, upper = (
-        table[:, start[part] : start[part] + m] for part in ("value", "lower", "upper")
-    )
+    ends = [f"{kind} {end}" for kind in ("prediction", "network") for end in Bounds._fields]
+    values, *parts = (table[:, start[title] : start[title] + m] for title in ("value", *ends))
+    bands = Bounds(*parts[:2]), Bounds(*parts[2:])
     offending = table[:, start["offending"] : start["offending"] + k]
     inside = table[:, start["domain"]] == 0.0
-    return Answers(values, lower, upper, table[:, start["score"]], inside, offending != 0.0)
+    return Answers(values, *bands, table[:, start["score"]], inside, offending != 0.0)

@@ -17,9 +17,10 @@ if (count !== undefined) {
   const domains = ["inside", "unusual", "outside"];
   const lines = readFileSync(0, "utf8").trim().split("\n").map((line) => {
     const [explosive, ...row] = line.split(" ").map(Number);
-    const { values, lower, upper, score, domain, offending } = predictRow(explosive, row);
+    const { values, predictionLower, predictionUpper, networkLower, networkUpper, score, domain, offending } = predictRow(explosive, row);
+    const ends = [predictionLower, predictionUpper, networkLower, networkUpper].flat();
     const flags = offending.map((flag) => (flag ? 1 : 0));
-    return [...values, ...lower, ...upper, score, domains.indexOf(domain), ...flags].join(" ");
+    return [...values, ...ends, score, domains.indexOf(domain), ...flags].join(" ");
   });
   console.log(lines.join("\n"));
 }

@@ -1,4 +1,4 @@
-/* Every number of the page with its band. */
+/* Every number of the page with its prediction band. */
 import { network, predictRow } from "../model.js";
 import { completed, inputNames } from "./design.js";
 
@@ -9,8 +9,15 @@ const outputTitles = {
 };
 
 /** Mean way of a bench thrown level: 2/3 of the reach of its crest (castblast.muckpile.ballistic). */
-export function throwDistance(speed, height) {
+export function flightDistance(speed, height) {
   return (2 / 3) * speed * Math.sqrt((2 * height) / gravity);
+}
+
+/** Throw of the centre of mass and its prediction band (castblast.bands): rock slides on after landing. */
+export function throwOf(speed, height) {
+  const flight = flightDistance(speed, height);
+  const { factor, less, more } = facts.throw;
+  return { flight, value: flight * factor, lower: flight * factor * less, upper: flight * factor * more };
 }
 
 /** Predict by names; raw answer of the model with names. */
@@ -21,24 +28,21 @@ export function predicted(design) {
 
 /**
  * Results of a design: key, variable (for the unit), title, value, lower, upper, note;
- * `exact` marks what is input or arithmetic and has no error of the surrogate.
+ * `exact` marks what is input or arithmetic; `flight` is the throw without sliding.
  */
 export function resultsOf(design) {
   const answer = predicted(design);
   const full = completed(design);
   const explosive = facts.explosives[design.explosive];
-  const rows = network.outputs.map(({ name, title, band }, j) => ({
+  const rows = network.outputs.map(({ name, title }, j) => ({
     key: name, variable: name, title: outputTitles[name] ?? sentence(title), exact: false,
-    value: answer.values[j], lower: answer.lower[j], upper: answer.upper[j],
-    note: `Surrogate, \u00b1\u00a0${percent(band)}`,
+    value: answer.values[j], lower: answer.predictionLower[j], upper: answer.predictionUpper[j], note: "",
   }));
   const speed = rows.find(({ key }) => key === "burden_velocity");
   if (speed) {
-    const way = (v) => throwDistance(v, full.bench_height);
     rows.push({
       key: "throw_distance", variable: "burden", title: "Mean throw", exact: false,
-      value: way(speed.value), lower: way(speed.lower), upper: way(speed.upper),
-      note: "Free flight, band of the velocity only",
+      ...throwOf(speed.value, full.bench_height), note: "free flight",
     });
   }
   const exact = (key, variable, title, value, note) => {
@@ -67,7 +71,7 @@ export function sensitivityOf(design, output = "burden_velocity", steps = 40) {
       const share = k / steps;
       const x = k === 0 ? lower : k === steps ? upper : log ? lower * (upper / lower) ** share : lower + share * (upper - lower);
       const answer = predicted({ explosive: design.explosive, values: { ...design.values, [name]: x } });
-      points.push({ x, value: answer.values[j], lower: answer.lower[j], upper: answer.upper[j], domain: answer.domain });
+      points.push({ x, value: answer.values[j], domain: answer.domain });
     }
     const trusted = points.filter(({ domain }) => domain === "inside");
     if (!trusted.length) return { name, low: null, high: null, size: 0 };

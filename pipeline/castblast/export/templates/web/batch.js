@@ -1,7 +1,7 @@
 /* Many designs: CSV in, CSV out. */
 import { network, predictRow } from "../model.js";
 import { completed, inputNames } from "./design.js";
-import { throwDistance } from "./answers.js";
+import { throwOf } from "./answers.js";
 
 /** Records of a CSV text; quotes, and comma or semicolon. */
 export function parseCsv(text) {
@@ -52,8 +52,8 @@ export function answerBatch(text) {
   const [heading, ...records] = parseCsv(text);
   if (!heading) return { header: [], rows: [], faults: ["the file is empty"] };
   const { columns, faults } = readHeading(heading);
-  const outputHeads = network.outputs.flatMap(({ name, unit }) => [`${name} [${unit}]`, `${name}_lower [${unit}]`, `${name}_upper [${unit}]`]);
-  const thrown = ["throw_distance [m]", "throw_distance_lower [m]", "throw_distance_upper [m]"];
+  const outputHeads = network.outputs.flatMap(({ name, unit }) => [`${name} [${unit}]`, `${name}_prediction_lower [${unit}]`, `${name}_prediction_upper [${unit}]`]);
+  const thrown = ["free_flight_distance [m]", "throw_distance [m]", "throw_distance_prediction_lower [m]", "throw_distance_prediction_upper [m]"];
   const header = ["explosive", ...network.inputs.map(({ name, unit }) => `${name} [${unit}]`), ...outputHeads, ...thrown, "domain", "inputs_at_fault"];
   if (faults.length) return { header, rows: [], faults };
   const speedAt = network.outputs.findIndex(({ name }) => name === "burden_velocity");
@@ -69,12 +69,13 @@ export function answerBatch(text) {
     const row = inputNames.map((name) => given[name]);
     const answer = predictRow(position, row);
     const height = completed({ values: given }).bench_height;
-    const way = speedAt < 0 ? ["", "", ""] : [answer.values, answer.lower, answer.upper].map((ends) => throwDistance(ends[speedAt], height));
-    rows.push([given.explosive, ...row, ...network.outputs.flatMap((_, k) => [answer.values[k], answer.lower[k], answer.upper[k]]), ...way, answer.domain, inputNames.filter((_, k) => answer.offending[k]).join(" ")]);
+    const way = speedAt < 0 ? ["", "", "", ""] : Object.values(throwOf(answer.values[speedAt], height));
+    rows.push([given.explosive, ...row, ...network.outputs.flatMap((_, k) => [answer.values[k], known(answer.predictionLower[k]), known(answer.predictionUpper[k])]), ...way, answer.domain, inputNames.filter((_, k) => answer.offending[k]).join(" ")]);
   });
   return { header, rows, faults };
 }
 
+const known = (value) => (Number.isNaN(value) ? "" : value);
 /** CSV text of a heading and rows. */
 export const csvText = (header, rows) => [header, ...rows].map((row) => row.join(",")).join("\n") + "\n";
 

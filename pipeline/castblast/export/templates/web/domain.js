@@ -2,7 +2,7 @@
 import { network } from "../model.js";
 
 const verdicts = {
-  inside: ["Inside the training domain", "The 95 % bands hold here."],
+  inside: ["Inside the training domain", "The surrogate repeats its simulator here."],
   unusual: ["Unusual combination", "Every value is in range, but together they are rare in the training designs. The bands may be too narrow."],
   outside: ["Outside the training domain", "The numbers are extrapolations; the bands do not hold."],
 };

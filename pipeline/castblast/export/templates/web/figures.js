@@ -84,15 +84,15 @@ export function benchFigure(result, system) {
   const lean = h / Math.tan(full.face_angle);
   const reach = (v, z) => v * Math.sqrt((2 * z) / 9.81);
   const back = 1.6 * full.burden + 0.12 * h;
-  const front = lean + full.burden + reach(speed.upper, h) * 1.04 + 0.05 * h;
+  const way = by.throw_distance;
+  const front = lean + full.burden + Math.max(reach(speed.upper, h), way.upper) * 1.04 + 0.05 * h;
   const [W, top, bottom] = [900, 26, 44];
   const f = Math.min((W - 20) / (back + front), 330 / h);
   const shift = (W - f * (back + front)) / 2;
   const X = (x) => shift + f * (x + back);
   const Z = (z) => top + f * (h - z);
   const H = top + f * h + bottom;
-  const way = by.throw_distance;
-  const svg = canvas(W, Math.ceil(H), `Side view of the bench, ${withUnit("bench_height", h, system, 3)} high, burden ${withUnit("burden", full.burden, system, 3)}; thrown level at ${withUnit("burden_velocity", speed.value, system, 3)}, its mean lands ${withUnit("burden", way.value, system, 3)} further`);
+  const svg = canvas(W, Math.ceil(H), `Side view of the bench, ${withUnit("bench_height", h, system, 3)} high, burden ${withUnit("burden", full.burden, system, 3)}; thrown level at ${withUnit("burden_velocity", speed.value, system, 3)}, its mean comes to rest ${shownValue(way, system)} further, ${shownEnds(way, system)}`);
   const toe = full.burden + lean;
   svg.append(
     path([[X(-back), Z(h)], [X(0), Z(h)], [X(0), Z(0)], [X(-back), Z(0)]], "solid", true),
@@ -117,36 +117,36 @@ export function benchFigure(result, system) {
     line(X(middle), Z(0) + 12, X(middle + way.value), Z(0) + 12, "measure"),
     line(X(middle + way.lower), Z(0) + 12, X(middle + way.upper), Z(0) + 12, "whisker"),
     svgNode("circle", { cx: X(middle + way.value), cy: Z(0) + 12, r: 4, class: "landing" }),
-    label(X(middle + way.value / 2), Z(0) + 32, `mean throw ${withUnit("burden", way.value, system, 3)}`, "middle", "note"),
+    label(X(middle + way.value / 2), Z(0) + 32, `mean throw ${shownValue(way, system)} (${shownEnds(way, system)})`, "middle", "note"),
     label(X(0) - 8, Z(h) - 8, "hole", "middle", "note"),
   );
   return { svg };
 }
 
-/** Tornado: velocity over the part of each input's range that stays in the domain. */
-export function tornadoFigure(lines, now, system) {
+/** Tornado: velocity over the part of each input's range that stays in the domain; the band shaded. */
+export function tornadoFigure(lines, speed, system) {
   const { unit, factor } = unitOf("burden_velocity", system);
   const shown = lines.filter(({ low }) => low);
   if (!shown.length) return null;
   const [W, row, left, right, top] = [420, 42, 6, 8, 6];
-  const low = Math.min(now, ...shown.map((l) => l.low.lower)) * factor;
-  const high = Math.max(now, ...shown.map((l) => l.high.upper)) * factor;
+  const low = Math.min(speed.lower, ...shown.map((l) => l.low.value)) * factor;
+  const high = Math.max(speed.upper, ...shown.map((l) => l.high.value)) * factor;
   const x = scaleOf(0.9 * low, 1.05 * high, left, W - right);
   const bottom = top + shown.length * row;
   const svg = canvas(W, bottom + 40, `Velocity over the range of each input: ${shown.map((l) => `${spaced(l.name)} ${digits(l.low.value * factor, 3)} to ${digits(l.high.value * factor, 3)} ${unit}`).join(", ")}`);
+  const ends = [x(speed.lower * factor), x(speed.upper * factor)];
+  svg.append(path([[ends[0], top], [ends[1], top], [ends[1], bottom], [ends[0], bottom]], "band", true));
   for (const t of ticks(0.9 * low, 1.05 * high, 6)) svg.append(line(x(t), top, x(t), bottom, "grid"), label(x(t), bottom + 16, tickText(t), "middle"));
   shown.forEach((l, i) => {
     const y = top + i * row;
     const [a, b] = [x(l.low.value * factor), x(l.high.value * factor)];
     svg.append(
       svgNode("rect", { x: a, y: y + 19, width: Math.max(1, b - a), height: 11, rx: 1.5, class: "bar" }),
-      line(x(l.low.lower * factor), y + 24.5, x(l.low.upper * factor), y + 24.5, "whisker"),
-      line(x(l.high.lower * factor), y + 24.5, x(l.high.upper * factor), y + 24.5, "whisker"),
       label(left, y + 13, titleOf(l.name), "start", "bar-name"),
       label(W - right, y + 13, `${withUnit(l.name, l.low.x, system, 3)} \u2192 ${withUnit(l.name, l.high.x, system, 3)}`, "end", "tick"),
     );
   });
-  svg.append(line(x(now * factor), top, x(now * factor), bottom, "now"), label(W - right, bottom + 33, `burden velocity [${unit}]`, "end", "axis-name"));
+  svg.append(line(x(speed.value * factor), top, x(speed.value * factor), bottom, "now"), label(W - right, bottom + 33, `burden velocity [${unit}]`, "end", "axis-name"));
   return { svg };
 }
 

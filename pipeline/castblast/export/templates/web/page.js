@@ -21,21 +21,21 @@ function showResults(result, other) {
   const cell = (row) => htmlNode(
     "li", { class: row.exact ? "result exact" : "result" },
     htmlNode("span", { class: "name" }, row.title),
-    htmlNode("output", { class: "value", id: `value-${row.key}`, "data-si": row.value, "data-lower": row.lower, "data-upper": row.upper }, withUnit(row.variable, row.value, system)),
-    htmlNode("span", { class: "range" }, row.exact ? row.note : `${digits(row.lower * unitOf(row.variable, system).factor)} to ${withUnit(row.variable, row.upper, system)}`),
+    htmlNode("output", { class: "value", id: `value-${row.key}`, "data-si": row.value, "data-lower": row.lower, "data-upper": row.upper }, shownValue(row, system)),
+    htmlNode("span", { class: "range" }, row.exact ? row.note : shownEnds(row, system)),
+    ...(row.flight === undefined ? [] : [htmlNode("span", { class: "range" }, `${row.note} ${withUnit(row.variable, row.flight, system, 3)} \u00d7 ${digits(facts.throw.factor, 2)}`)]),
     ...(other ? [difference(row, other)] : []),
   );
   at("results").replaceChildren(...result.rows.map(cell));
   const speed = result.rows.find(({ key }) => key === "burden_velocity");
-  at("glance").textContent = speed ? `${speed.title} ${withUnit(speed.variable, speed.value, system)} (${digits(speed.lower * unitOf(speed.variable, system).factor)} to ${digits(speed.upper * unitOf(speed.variable, system).factor)})` : "";
+  at("glance").textContent = speed ? `${speed.title} ${shownValue(speed, system)} (${shownEnds(speed, system)}; ${network.basis.split(":")[0]})` : "";
 }
 
 function difference(row, other) {
   const old = other.rows.find(({ key }) => key === row.key);
   if (!old) return htmlNode("span", { class: "difference" }, "");
   const change = row.value / old.value - 1;
-  const ends = row.exact ? "" : ` (${signed(row.lower / old.upper - 1)} to ${signed(row.upper / old.lower - 1)})`;
-  return htmlNode("span", { class: "difference" }, `${signed(change)} on ${withUnit(row.variable, old.value, state.system)}${ends}`);
+  return htmlNode("span", { class: "difference" }, `${signed(change)} on ${shownValue(old, state.system)}`);
 }
 
 const signed = (share) => `${share < 0 ? "\u2212" : "+"}${Math.abs(100 * share).toFixed(1)}\u00a0%`;
@@ -61,10 +61,10 @@ function showFigures(result) {
   place("hole-figure", hole, "");
   at("hole-legend").replaceChildren(...hole.legend.map(([kind, title, radius, row, variable]) => htmlNode(
     "li", {}, htmlNode("i", { class: kind }), `${title}: ${withUnit(variable, radius, system, 3)}`,
-    row ? ` (${digits(row.lower * unitOf(variable, system).factor)} to ${digits(row.upper * unitOf(variable, system).factor)})` : " (given)",
+    row ? ` (${shownEnds(row, system)})` : " (given)",
   )));
   const speed = result.rows.find(({ key }) => key === "burden_velocity");
-  place("tornado-figure", speed ? tornadoFigure(sensitivityOf(design), speed.value, system) : null, "No part of any range lies inside the training domain here.");
+  place("tornado-figure", speed ? tornadoFigure(sensitivityOf(design), speed, system) : null, "No part of any range lies inside the training domain here.");
 }
 
 function showNothing() {

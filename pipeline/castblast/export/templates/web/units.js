@@ -37,6 +37,15 @@ export function withUnit(name, value, system, count = 4) {
   return `${digits(value * factor, count)}${unit && unit !== "\u00b0" ? "\u00a0" : ""}${unit}`;
 }
 
+/** A value with figures that its band bears out. */
+export const shownValue = (row, system) => withUnit(row.variable, row.value, system, row.exact ? 4 : 3);
+/** Ends of the band of a result: two figures where they lie far apart. */
+export function shownEnds({ variable, lower, upper }, system) {
+  if (!Number.isFinite(lower)) return "no band is stated";
+  const count = upper > 1.5 * lower ? 2 : 3;
+  return `${digits(lower * unitOf(variable, system).factor, count)} to ${withUnit(variable, upper, system, count)}`;
+}
+
 /** A round number of an axis. */
 export const tickText = (value) => String(Number(value.toPrecision(4)));
 /** Name of a variable in words for people. */
