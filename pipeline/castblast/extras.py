@@ -19,11 +19,11 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     "track": ("mlflow", "skops"),
     "torch": ("torch",),
     "tune": ("optuna",),
-    "plot": ("matplotlib", "PIL", "contourpy", "shapely", "jinja2"),
+    "plot": ("matplotlib", "PIL", "contourpy", "shapely"),
+    "export": ("jinja2", "onnx"),
     "vtk": ("vtkmodules",),
     "stl": ("trimesh",),
     "excel": ("openpyxl",),
-    "onnx": ("onnx",),
     "onnx-test": ("onnxruntime",),
     "dvc": ("dvc",),
     "web": ("playwright",),
@@ -35,6 +35,8 @@ _TITLES = {
     "dask": "Dask", "numba": "Numba", "scipy": "SciPy", "onnx": "ONNX", "onnxruntime":
     "ONNX Runtime", "jinja2": "Jinja", "dvc": "DVC", "playwright": "Playwright",
 }  # fmt: skip
+#: A line names at most so many libraries.
+_MOST_NAMED = 4
 
 
 def missing_libraries(*extras: str) -> list[str]:
@@ -80,6 +82,8 @@ def require(*extras: str, purpose: str) -> None:
 def missing_line(libraries: Sequence[str], purpose: str) -> str:
     """One line: what is missing for what, and the command that installs it."""
     names = [_TITLES.get(name, name) for name in libraries]
+    if len(names) > _MOST_NAMED:
+        names = [*names[: _MOST_NAMED - 1], f"{len(names) - _MOST_NAMED + 1} more libraries"]
     listed = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
     return f"{purpose} needs {listed}: {install_command(libraries)}"
 

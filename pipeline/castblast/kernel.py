@@ -8,6 +8,9 @@ Compiled code is cached in a folder named by the hash of every kernel source. Nu
 only watches the file of the outermost function, so an edit in an imported kernel would go
 unnoticed; a hash over all sources cannot. Numba unpickles what it finds there, so without a folder
 that is surely this user's own nothing is cached, and each process compiles for itself.
+
+Without Numba kernels stay plain Python: the same numbers a thousand times slower, enough for the
+states of an explosive. What simulates asks for Numba before it begins (`castblast.extras`).
 """
 
 from __future__ import annotations
@@ -20,6 +23,7 @@ from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast
 
 from castblast.caches import cache_folder
+from castblast.extras import is_installed
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -40,6 +44,11 @@ def source_hash(entries: tuple[str, ...] = _SOURCES) -> str:
 
 
 @cache
+def _has_numba() -> bool:
+    return is_installed("numba")
+
+
+@cache
 def _prepare_cache() -> str | None:
     """Name the cache folder before Numba is imported and return it; None: nothing is kept."""
     folder = cache_folder("kernels", source_hash()[:16])
@@ -48,6 +57,12 @@ def _prepare_cache() -> str | None:
         return None
     os.environ["NUMBA_CACHE_DIR"] = str(folder)
     return str(folder)
+
+
+def is_compiled(package: str) -> bool:
+    """Say whether compiled kernels of a subpackage, such as ``nearfield``, lie in the cache."""
+    folder = _prepare_cache()
+    return folder is not None and any(Path(folder).glob(f"{package}*/*.nbi"))
 
 
 def kernel(function: Callable[_P, _R]) -> Callable[_P, _R]:
@@ -90,6 +105,8 @@ def _compile(
     inline: bool = False,
     fused: bool = False,
 ) -> Callable[_P, _R]:
+    if not _has_numba():
+        return function
     folder = _prepare_cache()
     import numba
 

@@ -109,7 +109,7 @@ def test_a_fault_of_an_installed_library_is_no_missing_library() -> None:
         ("xarray", ("generate", "quickstart.yaml"), "data"),
         ("dask", ("dataset", "describe", "toy.nc"), "data"),
         ("openpyxl", ("export", "net.json", "--to", "excel"), "excel"),
-        ("onnx", ("export", "net.json", "--to", "json,onnx"), "onnx"),
+        ("onnx", ("export", "net.json", "--to", "json,onnx"), "export"),
         ("numba", ("simulate",), "simulate"),
         ("matplotlib", ("muckpile", "demo"), "plot"),
     ],

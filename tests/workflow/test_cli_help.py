@@ -7,11 +7,13 @@ from pathlib import Path
 
 import click
 import pytest
+import typer
 import typer.main
 
 from castblast.cli import main
 from castblast.cli.app import app
-from castblast.cli.verb import literal
+from castblast.cli.screen import Screen
+from castblast.cli.verb import literal, verb
 from castblast.resources import SPEC_FOLDERS, find_spec, shipped_specs
 from castblast.specs.bench import load_bench
 from castblast.specs.case import read_case
@@ -122,3 +124,26 @@ def test_verbs_take_names_that_ship(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "unknown model spec 'levenbrg', did you mean 'levenberg'?" in capsys.readouterr().err
     assert main(["export", "full", "--to", "json", "--out", str(tmp_path / "out")]) == 0
     assert (tmp_path / "out" / "network.json").is_file()
+
+
+@pytest.mark.parametrize(("package", "said"), [("nearfield", True), (None, False)])
+def test_the_first_run_says_that_it_compiles(
+    package: str | None,
+    said: bool,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr("castblast.kernel._prepare_cache", lambda: str(tmp_path))
+    small = typer.Typer()
+
+    def work(screen: Screen) -> None:
+        screen.say("done")
+
+    verb(small, compiles=package)(work)
+    small([], standalone_mode=False)
+    assert ("compiling the physics kernels" in capsys.readouterr().err) is said
+    (tmp_path / "nearfield_123").mkdir()
+    (tmp_path / "nearfield_123" / "march.nbi").touch()
+    small([], standalone_mode=False)
+    assert "compiling" not in capsys.readouterr().err

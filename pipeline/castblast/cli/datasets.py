@@ -45,7 +45,7 @@ def describe(screen: Screen, dataset: _Dataset) -> Mapping[str, Any]:
     return description.document
 
 
-@verb(app, needs=("simulate", "data"))
+@verb(app, needs=("simulate", "data"), compiles="nearfield")
 def reproduce(
     screen: Screen,
     dataset: _Dataset,
@@ -62,7 +62,7 @@ def reproduce(
     return outcome.document
 
 
-@verb(app, needs=("simulate", "data"))
+@verb(app, needs=("simulate", "data"), compiles="nearfield")
 def extend(
     screen: Screen,
     dataset: _Dataset,

@@ -23,7 +23,6 @@ def demo(
     from castblast.stages.demo import STEPS, make_demo, next_commands, summarise
 
     job = make_demo(out, workers=workers, restart=restart)
-    screen.note("The first run compiles the kernels; that takes about a minute.")
     for number, step in enumerate(STEPS, start=1):
         with screen.progress(f"{number}/{len(STEPS)} {step.title}") as progress:
             lines = step.run(job, progress)
@@ -37,4 +36,4 @@ def demo(
 
 def add_to(app: typer.Typer) -> None:
     """Register the verb."""
-    verb(app, needs=("simulate", "data", "train", "plot", "onnx"))(demo)
+    verb(app, needs=("simulate", "data", "train", "plot", "export"), compiles="nearfield")(demo)

@@ -52,7 +52,7 @@ def list_(screen: Screen) -> Mapping[str, Any]:
     return {"explosives": entries}
 
 
-@verb(app)
+@verb(app, needs=("simulate",))
 def show(screen: Screen, name: _Name) -> Mapping[str, Any]:
     """Show one explosive: states, energies, where its numbers come from."""
     from castblast.stages.explosives import describe
@@ -84,7 +84,7 @@ def _parts(value: float | Mapping[str, float] | None) -> list[tuple[str, float]]
     return list(value.items()) if isinstance(value, Mapping) else [("", value)]
 
 
-@verb(app)
+@verb(app, needs=("simulate",))
 def check(screen: Screen, name: _Name) -> Mapping[str, Any]:
     """Check that an explosive's numbers belong together (exit code 4 if they do not)."""
     from castblast.stages.explosives import check_explosive

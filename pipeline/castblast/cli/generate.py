@@ -42,4 +42,4 @@ def generate(
 
 def add_to(app: typer.Typer) -> None:
     """Register the verb."""
-    verb(app, needs=("simulate", "data"))(generate)
+    verb(app, needs=("simulate", "data"), compiles="nearfield")(generate)

@@ -31,4 +31,4 @@ def infill(
 
 def add_to(app: typer.Typer) -> None:
     """Register the verb."""
-    verb(app, needs=("simulate", "data", "train"))(infill)
+    verb(app, needs=("simulate", "data", "train"), compiles="nearfield")(infill)

@@ -147,5 +147,5 @@ def _show(screen: Screen, outcome: "MuckpileOutcome") -> Mapping[str, Any]:
 
 def add_to(app: typer.Typer) -> None:
     """Register the verbs."""
-    verb(app, needs=("simulate", "plot"))(muckpile)
+    verb(app, needs=("simulate", "plot"), compiles="muckpile")(muckpile)
     verb(app, needs=("simulate", "plot"))(compare_muckpiles)

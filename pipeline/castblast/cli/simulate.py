@@ -78,4 +78,4 @@ def simulate(
 
 def add_to(app: typer.Typer) -> None:
     """Register the verb."""
-    verb(app, needs=("simulate",))(simulate)
+    verb(app, needs=("simulate",), compiles="nearfield")(simulate)

@@ -27,7 +27,10 @@ _SHARED = {
 
 
 def verb(
-    app: typer.Typer, name: str | None = None, needs: tuple[str, ...] = ()
+    app: typer.Typer,
+    name: str | None = None,
+    needs: tuple[str, ...] = (),
+    compiles: str | None = None,
 ) -> Callable[[Verb], Verb]:
     """Register a function of (screen, ...) as a verb of `app`.
 
@@ -38,6 +41,8 @@ def verb(
         Default: that of the function.
     needs : tuple of str
         Extras of castblast without which it is not begun.
+    compiles : str, optional
+        Subpackage whose kernels it compiles where that was not done before.
     """
 
     def register(function: Verb) -> Verb:
@@ -46,6 +51,7 @@ def verb(
         ) -> None:
             screen = Screen(as_json, quiet, debug)
             require(*needs, purpose=context.command_path)
+            _announce_compilation(screen, compiles)
             payload = function(screen, **options)
             if screen.as_json and payload is not None:
                 screen.document(payload)
@@ -75,6 +81,16 @@ def verb(
         return function
 
     return register
+
+
+def _announce_compilation(screen: Screen, package: str | None) -> None:
+    """Say why the first run on a machine takes longer than the next."""
+    if package is None:
+        return
+    from castblast.kernel import is_compiled
+
+    if not is_compiled(package):
+        screen.note("compiling the physics kernels: about a minute, on the first run only")
 
 
 def literal(text: str) -> str:

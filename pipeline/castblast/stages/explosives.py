@@ -46,16 +46,21 @@ class CheckOutcome:
 
 def catalogue() -> list[dict[str, Any]]:
     """Short descriptions of the catalogue, in alphabetical order; SI units."""
-    keys = (
-        "name",
-        "density",
-        "detonation_velocity",
-        "heat_of_explosion",
-        "cj_pressure",
-        "explosion_pressure",
-    )
-    described = [describe(name) for name in explosive_names()]
-    return [{key: entry[key] for key in keys} for entry in described]
+    entries = []
+    for name in explosive_names():
+        spec = load_explosive(name)
+        state = spec.cj_state()
+        entries.append(
+            {
+                "name": spec.name,
+                "density": spec.density,
+                "detonation_velocity": spec.detonation_velocity,
+                "heat_of_explosion": spec.heat_of_explosion,
+                "cj_pressure": None if state is None else state.pressure,
+                "explosion_pressure": pressure(spec.to_explosive().isentrope, 1.0),
+            }
+        )
+    return entries
 
 
 def describe(name_or_path: str) -> dict[str, Any]:

@@ -30,7 +30,9 @@ if TYPE_CHECKING:
 #: Every target; `all` stands for them together.
 TARGET_NAMES = ("json", "onnx", "c", "js", "python", "pfc", "lammps", "excel", "web")
 #: Extras that some of them need.
-_EXTRAS = {"onnx": ("onnx",), "excel": ("excel",)}
+_EXTRAS = {"excel": ("excel",)} | dict.fromkeys(
+    ("onnx", "c", "js", "python", "pfc", "lammps", "web"), ("export",)
+)
 
 
 @dataclass(frozen=True)
