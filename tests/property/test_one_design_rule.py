@@ -164,8 +164,8 @@ def test_charge_and_stemming_name_one_design():
     assert by_charge["domain"] == by_stemming["domain"] == both["domain"] == "inside"
     for name in network.output_names:
         assert by_charge[name] == pytest.approx(by_stemming[name], rel=1e-12)
-        assert by_charge["bands"][name]["upper"] == pytest.approx(
-            by_stemming["bands"][name]["upper"], rel=1e-12
+        assert by_charge["network_band"][name]["upper"] == pytest.approx(
+            by_stemming["network_band"][name]["upper"], rel=1e-12
         )
 
 

@@ -242,7 +242,7 @@ def test_faults_of_a_csv_come_all_at_once_with_their_lines(network: Path, tmp_pa
     for part in ("did you mean 'burden'", "ucs [kg]", "given twice"):
         assert part in str(fault.value)
     path.write_text("burden [m]\n")
-    with pytest.raises(SpecError, match="at least one design"):
+    with pytest.raises(SpecError, match="at least one row"):
         predict_csv(path, network)
 
 

@@ -41,16 +41,9 @@ def predict(
     data, or unusual among it, is called so, and the inputs at fault are named.
     """
     from castblast.bands import BAND_TITLE
-    from castblast.specs.case import split_assignments
+    from castblast.specs.case import parse_values, split_assignments
     from castblast.stages.predict import predict_design
 
-    if csv is not None:
-        from castblast.stages.predict_table import predict_csv
-
-        table = predict_csv(csv, network)
-        if not screen.as_json:
-            screen.say(table.text.rstrip())
-        return {"rows": table.rows}
     options = {
         "burden": burden,
         "bench_height": bench_height,
@@ -61,7 +54,17 @@ def predict(
         "young_modulus": young_modulus,
     }
     given = {name: value for name, value in options.items() if value is not None}
-    answer = predict_design({**given, **split_assignments(settings or [])}, explosive, network)
+    given |= split_assignments(settings or [])
+    if csv is not None:
+        from castblast.stages.predict_table import predict_csv
+
+        common = parse_values(given, "predict")
+        table = predict_csv(csv, network, explosive=explosive, common=common)
+        if screen.as_json:
+            return {"rows": table.rows}
+        screen.say(table.text.rstrip())
+        return {}
+    answer = predict_design(given, explosive, network)
     screen.table(("quantity", "value", BAND_TITLE, "unit"), answer.rows, title=answer.title)
     for line in answer.remarks:
         screen.note(line)

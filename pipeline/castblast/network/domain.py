@@ -82,11 +82,14 @@ def keeps_ranges_and_rules(shell: Shell, numeric: Floats) -> NDArray[np.bool_]:
     return inside
 
 
-def in_domain(shell: Shell, numeric: Floats) -> NDArray[np.bool_]:
-    """Tell for each row of SI inputs (n, k) whether it lies in the domain; NaN does not."""
+def in_domain(shell: Shell, numeric: Floats, score: Floats | None = None) -> NDArray[np.bool_]:
+    """Tell for each row of SI inputs (n, k) whether it lies in the domain; NaN does not.
+
+    `score` is that of `density_score`, where it is known already.
+    """
     inside = keeps_ranges_and_rules(shell, numeric)
     if shell.density is not None:
-        inside &= density_score(shell, numeric) <= 1.0
+        inside &= (density_score(shell, numeric) if score is None else score) <= 1.0
     return inside
 
 

@@ -152,12 +152,13 @@ def member_spread(network: Network, numeric: Floats, index: NDArray[np.int64]) -
 def predict_rows(network: Network, numeric: Floats, index: NDArray[np.int64]) -> RowPredictions:
     """Evaluate rows of SI inputs with bands and domain; parameters as `evaluate_rows`."""
     values = evaluate_rows(network, numeric, index)
+    score = density_score(network, numeric)
     return RowPredictions(
         values,
         prediction_bounds(network, values),
         network_bounds(network, values),
-        density_score(network, numeric),
-        in_domain(network, numeric),
+        score,
+        in_domain(network, numeric, score),
     )
 
 

@@ -25,7 +25,7 @@ __all__ = ["ID_HEADS", "Form", "Table", "read_table"]
 
 #: Heads of a column that names the rows.
 ID_HEADS = ("id", "name", "label", "hole", "hole_id", "hole_name", "hole_no", "hole_number")
-_CHUNK = 20_000
+_CHUNK = 4096
 _LONGEST_ID = 200
 
 

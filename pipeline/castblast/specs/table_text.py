@@ -11,7 +11,7 @@ import codecs
 import csv
 import io
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -79,29 +79,27 @@ def open_sheet(path: Path) -> Sheet:
         One line: no file, no text, another kind of file, nothing in it, a line or a table beyond
         all bounds. The rows may raise it too, with their line.
     """
-    lines = _numbered(decode(path, read_bytes(path)), path)
+    text = decode(path, read_bytes(path))
+    lines = _lines(text, path)
     remarks: list[tuple[int, str]] = []
-    separator = ""
-    for number, line in lines:
+    separator, at = "", -1
+    for at, line in enumerate(lines):
         bare = line.strip()
         if not bare.strip(",;\t\" '"):
             continue
         if bare.startswith(_REMARK):
-            remarks.append((number, bare))
-            continue
-        if match := _SEPARATOR_LINE.fullmatch(bare):
+            remarks.append((at + 1, bare))
+        elif match := _SEPARATOR_LINE.fullmatch(bare):
             separator = match[1]
-            continue
-        break
+        else:
+            break
     else:
         raise SpecError(f"{path}: is empty")
-    following = next(lines, None)
-    rest = _chained((following,) if following else (), lines)
-    separator = separator or _separator(line, following[1] if following else "")
-    head = _cells(line, separator, path, number)
+    separator = separator or _separator(lines[at], lines[at + 1] if at + 1 < len(lines) else "")
+    head = _cells(lines[at], separator, path, at + 1)
     if named := _heads_in_remark(remarks, head, separator, path):
-        return _sheet(path, *named, _rows(_chained([(number, line)], rest), separator, path))
-    return _sheet(path, number, head, separator, _rows(rest, separator, path))
+        return _sheet(path, *named, _rows(lines, at, separator, path))
+    return _sheet(path, at + 1, head, separator, _rows(lines, at + 1, separator, path))
 
 
 def _sheet(
@@ -177,20 +175,16 @@ def _decoded(path: Path, data: bytes, encoding: str) -> str:
     return text
 
 
-def _numbered(text: str, path: Path) -> Iterator[tuple[int, str]]:
-    for number, line in enumerate(io.StringIO(text, newline=None), 1):
-        if len(line) > LONGEST_LINE:
-            raise SpecError(
-                f"{path}: line {number}: {len(line):,} characters; at most {LONGEST_LINE:,}"
-            )
-        yield number, line
-
-
-def _chained(
-    first: Iterable[tuple[int, str]], rest: Iterator[tuple[int, str]]
-) -> Iterator[tuple[int, str]]:
-    yield from first
-    yield from rest
+def _lines(text: str, path: Path) -> list[str]:
+    """Lines of a text with their ends, none of them beyond all bounds."""
+    lines = io.StringIO(text, newline=None).readlines()
+    if max(map(len, lines), default=0) > LONGEST_LINE:
+        number = next(k for k, line in enumerate(lines, 1) if len(line) > LONGEST_LINE)
+        raise SpecError(
+            f"{path}: line {number}: {len(lines[number - 1]):,} characters; at most "
+            f"{LONGEST_LINE:,}"
+        )
+    return lines
 
 
 def _separator(head: str, following: str) -> str:
@@ -206,7 +200,7 @@ def _separator(head: str, following: str) -> str:
 def _cells(line: str, separator: str, path: Path, number: int) -> list[str]:
     if separator == " ":
         return _WORD.findall(line)
-    return next((cells for _, cells in _rows(iter([(number, line)]), separator, path)), [])
+    return next((cells for _, cells in _rows([line], 0, separator, path, number)), [])
 
 
 def _heads_in_remark(
@@ -228,38 +222,49 @@ def _heads_in_remark(
 
 
 def _rows(
-    lines: Iterator[tuple[int, str]], separator: str, path: Path
+    lines: list[str], first: int, separator: str, path: Path, number: int = 1
 ) -> Iterator[tuple[int, list[str]]]:
-    """Line number and cells of the lines that are neither blank nor a remark."""
+    """Line and cells of each line from `first` on that is neither blank nor a remark.
+
+    `number` is that of the first of all lines.
+    """
     count = 0
-    for number, cells in _split(lines, separator, path):
-        if "".join(cells).strip():
+    for line, cells in _split(lines[first:], number + first, separator, path):
+        if cells and (cells[0].strip() or "".join(cells).strip()):
             count += 1
             if count > MOST_ROWS:
                 raise SpecError(f"{path}: more than {MOST_ROWS:,} rows; split it")
-            yield number, cells
+            yield line, cells
 
 
 def _split(
-    lines: Iterator[tuple[int, str]], separator: str, path: Path
+    lines: list[str], number: int, separator: str, path: Path
 ) -> Iterator[tuple[int, list[str]]]:
+    """Number and cells of each line; a remark has none."""
     if separator == " ":
-        for number, line in lines:
-            if not line.lstrip().startswith(_REMARK):
-                yield number, line.split()
+        for line in lines:
+            yield number, [] if line.lstrip().startswith(_REMARK) else line.split()
+            number += 1
         return
-    current = 0
+    current = number - 1
+    plain = not any('"' in line or "#" in line or "//" in line for line in lines)
 
     def feed() -> Iterator[str]:
         nonlocal current
-        for number, line in lines:
-            if not line.startswith(_REMARK) and not line.lstrip().startswith(_REMARK):
-                current = number
+        for line in lines:
+            current += 1
+            if not line.lstrip().startswith(_REMARK):
                 yield line
 
-    reader = csv.reader(feed(), delimiter=separator, skipinitialspace=True, strict=True)
+    reader = csv.reader(
+        lines if plain else feed(), delimiter=separator, skipinitialspace=True, strict=True
+    )
     try:
+        if plain:  # a line is a row
+            yield from enumerate(reader, number)
+            return
         for cells in reader:
             yield current, cells
     except csv.Error as fault:
-        raise SpecError(f"{path}: line {current}: is no CSV: {fault}") from None
+        at = number - 1 + reader.line_num if plain else current
+        raise SpecError(f"{path}: line {at}: is no CSV: {fault}") from None

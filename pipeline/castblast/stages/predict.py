@@ -6,7 +6,7 @@ Imports NumPy and light modules only, so that the command line answers in well u
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from castblast.export.json_file import read_network
 from castblast.network import Floats, Network, RowPredictions, member_spread
 from castblast.resources import SHIPPED_NETWORKS, is_bare_name, resource
 from castblast.stages.predict_columns import (
+    ColumnPredictions,
     explosive_position,
     network_designs,
     predict_columns,
@@ -91,48 +92,56 @@ def predict(
     index = np.array([explosive_position(model, explosive)], dtype=np.int64)
     answers = predict_columns(values, index, model)
     require_possible(answers.designs.faults)
-    inputs = {name: float(column[0]) for name, column in answers.designs.inputs.items()}
-    numeric = np.array([list(inputs.values())])
-    violations = row_violations(answers, 0, model)
-    row = answers.rows
-    outputs = dict(zip(model.output_names, row.values[0].tolist(), strict=True))
-    score = float(row.score[0])
-    return {
-        "explosive": model.explosives[index[0]],
-        **outputs,
-        **band_document(outputs, {c.name: c.relative_band for c in model.outputs}),
-        "network_band": _network_band(model, row),
-        **_spread(model, numeric, index),
-        "display": {column.name: column.show(outputs[column.name]) for column in model.outputs},
-        "inputs": inputs,
-        "in_domain": not violations,
-        "domain": str(answers.domain[0]),
-        "out_of_domain": list(dict.fromkeys(n for v in violations for n in v.inputs)),
-        "domain_faults": [violation.message for violation in violations],
-        "domain_kinds": [violation.kind for violation in violations],
-        "density_score": score if math.isfinite(score) else None,
-        "model": _identity(model),
-    }
+    return next(answer_document(answers, index, model))
 
 
-def _network_band(model: Network, row: RowPredictions) -> dict[str, dict[str, float]]:
+def answer_document(
+    answers: ColumnPredictions, explosive: NDArray[np.int64], network: Network
+) -> Iterator[dict[str, Any]]:
+    """Make the document of every row, see `predict`; rows that are refused have no meaning."""
+    names = list(answers.designs.inputs)
+    numeric = np.stack(list(answers.designs.inputs.values()), axis=1)
+    spread = member_spread(network, numeric, explosive) if network.members else None
+    relative = {c.name: c.relative_band for c in network.outputs}
+    identity = _identity(network)
+    for k in range(len(explosive)):
+        outputs = dict(zip(network.output_names, answers.rows.values[k].tolist(), strict=True))
+        inside = answers.domain[k] == "inside"
+        violations = [] if inside else row_violations(answers, k, network)
+        score = float(answers.rows.score[k])
+        yield {
+            "explosive": network.explosives[explosive[k]],
+            **outputs,
+            **band_document(outputs, relative),
+            "network_band": _network_band(network, answers.rows, k),
+            **({} if spread is None else {"spread": _named(network, spread[k])}),
+            "display": {c.name: c.show(outputs[c.name]) for c in network.outputs},
+            "inputs": dict(zip(names, numeric[k].tolist(), strict=True)),
+            "in_domain": not violations,
+            "domain": str(answers.domain[k]),
+            "out_of_domain": list(dict.fromkeys(n for v in violations for n in v.inputs)),
+            "domain_faults": [violation.message for violation in violations],
+            "domain_kinds": [violation.kind for violation in violations],
+            "density_score": score if math.isfinite(score) else None,
+            "model": identity,
+        }
+
+
+def _network_band(network: Network, rows: RowPredictions, row: int) -> dict[str, dict[str, float]]:
     """Ends of the 95 % bands of the network about one row."""
     return {
         column.name: {
-            "lower": float(row.network.lower[0, j]),
-            "upper": float(row.network.upper[0, j]),
+            "lower": float(rows.network.lower[row, j]),
+            "upper": float(rows.network.upper[row, j]),
             "relative": column.relative_band,
         }
-        for j, column in enumerate(model.outputs)
+        for j, column in enumerate(network.outputs)
     }
 
 
-def _spread(model: Network, numeric: Floats, index: NDArray[np.int64]) -> dict[str, Any]:
-    """Relative spread of the members of an ensemble, if the network has any."""
-    if not model.members:
-        return {}
-    spread = member_spread(model, numeric, index)[0]
-    return {"spread": dict(zip(model.output_names, spread.tolist(), strict=True))}
+def _named(network: Network, values: Floats) -> dict[str, float]:
+    """Values of the outputs by their names."""
+    return dict(zip(network.output_names, values.tolist(), strict=True))
 
 
 def predict_design(
