@@ -91,7 +91,7 @@ def test_faults_of_a_variable(tmp_path, entry, expected):
         ({"sed": 3}, "did you mean 'seed'?"),
         ({"seed": None}, "seed: is missing"),
         ({"version": "1.0"}, "three numbers are needed"),
-        ({"name": "Small Set"}, "lower-case letters"),
+        ({"name": "Small Set"}, "letters, digits, '-', '_' and '.' are allowed"),
         ({"explosives": []}, "explosives"),
         ({"explosives": ["anfo", "anfo"]}, "given twice: anfo"),
         ({"split": {"train": 0.9, "valid": 0.2, "calibration": 0, "test": 0}}, "add up to 1.1"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -109,3 +110,60 @@ def test_hash_is_of_the_content(tmp_path: Path) -> None:
     same = load_spec(written(tmp_path, "burden: 350 cm\nname: x\n"), Case)
     other = load_spec(written(tmp_path, "burden: 351 cm\nname: x\n"), Case)
     assert one.sha256() == same.sha256() != other.sha256()
+
+
+def _bomb(depth: int, merge: bool = False) -> str:
+    """Nine aliases a level: nine to the power of the depth values in a few hundred bytes."""
+    lines = ["a0: &a0 {x: 1}" if merge else "a0: &a0 [x]"]
+    for k in range(1, depth):
+        parts = ", ".join([f"*a{k - 1}"] * 9)
+        lines.append(f"a{k}: &a{k} {{<<: [{parts}]}}" if merge else f"a{k}: &a{k} [{parts}]")
+    return "\n".join(lines) + "\nname: x\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        (_bomb(12), "written out"),
+        (_bomb(12, merge=True), "written out"),
+        ("name: &a [*a]\n", "an alias stands for what it is part of"),
+        ("name: &a {b: *a}\n", "an alias stands for what it is part of"),
+        ("name: " + "[" * 20_000, "nested too deeply"),
+        ("name: " + "9" * 5000, "is not a usable number"),
+        ("name: 0x" + "f" * 5000, "is not a usable number"),
+        ("name: " + "1" + ":1" * 5000, "is not a usable number"),
+        ("name: " + "9" * 5000 + ".0", "is not a usable number"),
+        ("name: !!int x", "'x' is not a usable number"),
+        ("name: !!float x", "'x' is not a usable number"),
+        ("name: !!bool x", "cannot be read as its tag says"),
+        ("name: !!python/object/apply:os.system [ls]", "could not determine a constructor"),
+        ("name: !!timestamp 2001-99-99", "could not determine a constructor"),
+        ("name: !!binary ====", "could not determine a constructor"),
+        ('name: "a\\0b"', "the character '\\x00' is not allowed"),
+        ('name: "a\\ud800b"', "the character '\\ud800' is not allowed"),
+        ('name: "\\e[2J"', "the character '\\x1b' is not allowed"),
+        ("x: " + "y" * (2 << 20), "is larger than 1 MB, the most a YAML file may have"),
+        ("name: x\nrock: {ucs: 2001-01-01}", "rock.ucs: 2001-01-01: "),
+        ("name: x\nburden: 2001-01-01", "burden: 2001-01-01: "),
+        ("name: 2001-99-99\nburden: 9" + "9" * 300, "burden: an integer of about 301 digits"),
+    ],
+    ids=range(22),
+)
+def test_what_a_file_may_not_do_to_its_reader(tmp_path: Path, text: str, line: str) -> None:
+    """Bombs, tags and control characters: one line, in bounded time."""
+    start = time.process_time()
+    found = said(written(tmp_path, text))
+    assert time.process_time() - start < 3.0
+    assert line in found
+    assert len(found.splitlines()) == 1
+    assert len(found) < 300
+
+
+def test_a_few_aliases_and_merges_are_read(tmp_path: Path) -> None:
+    text = (
+        "name: 2024-01-01\nrock: &r {ucs: 90 MPa}\nlayers: [*r, {<<: *r, kind: soft}]\n"
+        "burden: 3\u00a0m\n"
+    )
+    case = load_spec(written(tmp_path, text), Case)
+    assert case.name == "2024-01-01", "a date stays text"
+    assert [layer.kind for layer in case.layers] == ["hard", "soft"]

@@ -6,6 +6,7 @@ import math
 import re
 import subprocess
 import sys
+import time
 
 import pytest
 from hypothesis import given
@@ -157,6 +158,32 @@ def test_a_range_is_said_in_the_unit_of_people(
     assert QuantityIn("m", 0.0).parse("1e9 m") == 1e9
     with pytest.raises(QuantityError):
         QuantityIn("m", 0.0).parse("-1 mm")
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["3 m^9^9^9", "3 m**9**9", "3 9**9**9", "3 m/(2**9**9**9)", "3 m^999999999", "3 1e400 m",
+     "3 m/0", "3 " + "(" * 80, "3 " + "m*" * 5000 + "m", "1" * 5000 + " m", "1e999 m",
+     "3 min^400", 10**400, 10**5000],
+    ids=lambda value: type(value).__name__,
+)  # fmt: skip
+def test_bombs_are_refused_at_once(text: object) -> None:
+    """Python would compute 9^9^9, and pint would ask it to."""
+    start = time.process_time()
+    with pytest.raises(SpecError) as fault:
+        parse_quantity(text, "m", "case.yaml: burden")
+    assert time.process_time() - start < 1.0
+    assert len(str(fault.value)) < 250
+    assert str(fault.value).isprintable()
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [("3 (m/s)^2", "m2 s-2", 9.0 / 3.0), ("2 1/s", "s-1", 2.0), ("4 kg/(m s2)", "Pa", 4.0),
+     ("5 kg m-1 s-2", "Pa", 5.0), ("1 MJ/kg", "J kg-1", 1e6), ("2 m**3", "m3", 2.0)],
+)  # fmt: skip
+def test_products_and_powers_of_units_are_read(text: str, unit: str, value: float) -> None:
+    assert parse_quantity(text, unit) == pytest.approx(value, rel=1e-14)
 
 
 def test_units_do_not_load_the_heavy_libraries() -> None:

@@ -67,6 +67,8 @@ def _report(error: BaseException, message: str, code: int, given: list[str], deb
         import json
 
         print(json.dumps({"error": message, "exit_code": code}, indent=2))
+    from castblast.names import printable
+
     for line in message.splitlines():
-        print(f"error: {line}", file=sys.stderr)
+        print(f"error: {printable(line)}", file=sys.stderr)
     return code

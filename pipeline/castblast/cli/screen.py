@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from castblast.names import printable
 from castblast.progress import ProgressCallback, silent
 
 #: First characters of a number.
@@ -41,12 +42,12 @@ class Screen:
     def say(self, line: str = "") -> None:
         """Print a line for people."""
         if not self.as_json:
-            print(line)
+            print(_lines(line))
 
     def note(self, line: str) -> None:
         """Print a remark on standard error unless quiet."""
         if not self.quiet:
-            print(line, file=sys.stderr)
+            print(_lines(line), file=sys.stderr)
 
     def table(self, header: Sequence[str], rows: Sequence[Sequence[str]], title: str = "") -> None:
         """Print a table for people; columns of numbers are aligned right, words left."""
@@ -58,14 +59,14 @@ class Screen:
         from rich.text import Text
 
         # Texts, not markup: a head like "heat [MJ/kg]" and a name like "x[/b]" stand as they are.
-        heading = Text(title) if title else None
+        heading = Text(printable(title)) if title else None
         table = Table(title=heading, title_justify="left", box=box.SIMPLE_HEAD)
         for index, name in enumerate(header):
             numbers = index > 0 and any(row[index][:1] in _NUMERIC for row in rows if row[index])
             justify: Literal["left", "right"] = "right" if numbers else "left"
-            table.add_column(Text(name), justify=justify, no_wrap=index == 0)
+            table.add_column(Text(printable(name)), justify=justify, no_wrap=index == 0)
         for row in rows:
-            table.add_row(*map(Text, row))
+            table.add_row(*(Text(printable(cell)) for cell in row))
         Console(width=None if sys.stdout.isatty() else 120).print(table)
 
     def document(self, payload: Mapping[str, Any]) -> None:
@@ -84,17 +85,17 @@ class Screen:
             from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
             columns = (
-                TextColumn("[bold]{task.description}"),
+                TextColumn("{task.description}", style="bold", markup=False),
                 BarColumn(bar_width=28),
                 TextColumn("{task.percentage:>3.0f} %"),
                 TimeElapsedColumn(),
-                TextColumn("{task.fields[line]}"),
+                TextColumn("{task.fields[line]}", markup=False),
             )
             with Progress(*columns, console=Console(stderr=True)) as bar:
                 task = bar.add_task(title, total=1.0, line="")
 
                 def update(share: float, line: str) -> None:
-                    bar.update(task, completed=share, line=line)
+                    bar.update(task, completed=share, line=printable(line))
 
                 yield update
                 bar.update(task, completed=1.0)
@@ -112,6 +113,11 @@ class _PlainLines:
         if tenth > self.tenth:
             self.tenth = tenth
             print(f"{self.title}: {share:4.0%} {line}", file=sys.stderr, flush=True)
+
+
+def _lines(text: str) -> str:
+    """Text of several lines without control characters."""
+    return "\n".join(map(printable, text.split("\n")))
 
 
 def _plain(value: Any) -> Any:

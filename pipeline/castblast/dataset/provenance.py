@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
+import re
 from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib.metadata import version
@@ -22,7 +23,7 @@ from castblast.errors import SpecError
 from castblast.kernel import source_hash
 from castblast.specs.catalogue import find_explosive
 from castblast.specs.explosive import ExplosiveSpec
-from castblast.specs.loading import make_spec, parse_yaml, read_text
+from castblast.specs.loading import make_spec, parse_yaml, read_yaml_text
 from castblast.specs.recipe import DESCRIPTIVE_KEYS, EXECUTION_KEYS, Recipe, RecipeSource
 from castblast.variables import VARIABLES
 
@@ -78,7 +79,7 @@ def load_explosives(source: RecipeSource) -> tuple[ExplosiveSource, ...]:
         try:
             path = find_explosive(written)
             path = path if path.is_absolute() else source.path.parent / path
-            found.append(explosive_from_text(read_text(path), str(path)))
+            found.append(explosive_from_text(read_yaml_text(path), str(path)))
         except SpecError as fault:
             faults.append(f"{source.path}: explosives: {fault}")
     names = [entry.name for entry in found]
@@ -93,9 +94,9 @@ def load_explosives(source: RecipeSource) -> tuple[ExplosiveSource, ...]:
 
 
 def explosive_from_text(text: str, where: str) -> ExplosiveSource:
-    """Read an explosive from the text of its file; spaces in its name become underscores."""
+    """Read an explosive from the text of its file; what no flag may hold becomes underscores."""
     spec = make_spec(parse_yaml(text, where), ExplosiveSpec, where)
-    return ExplosiveSource("_".join(spec.name.split()), text, spec)
+    return ExplosiveSource(re.sub(r"[^A-Za-z0-9.+_-]+", "_", spec.name).rstrip("_"), text, spec)
 
 
 def made_from(

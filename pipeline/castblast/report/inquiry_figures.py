@@ -142,7 +142,7 @@ def _formula(law: Document, trusted: bool) -> str:
     floor = 100.0 * law["floor"]
     constant = f"{floor:.2g} % + " if floor > 1e-4 else ""
     doubt = "" if trusted else ", not trusted"
-    return f"{constant}c $n^{{-{law['exponent']:.2f}}}${doubt}"
+    return f"{constant}c / n^{law['exponent']:.2f}{doubt}"
 
 
 def _percents(values: Sequence[float]) -> Floats:

@@ -10,6 +10,7 @@ from typing import Any
 
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatter, LogFormatterMathtext
 
 from castblast.files import write_with
 from castblast.variables import VARIABLES
@@ -34,6 +35,8 @@ _STYLE: Any = {
     "legend.frameon": False,
     "legend.fontsize": 8,
     "lines.linewidth": 1.6,
+    # A dollar sign in a name is a dollar sign.
+    "text.parse_math": False,
     "figure.facecolor": "white",
 }
 
@@ -57,8 +60,26 @@ def new_figure(
 def save_figure(figure: Figure, path: Path, *, dpi: int = 150) -> Path:
     """Write a PNG (or SVG, by suffix) whole or not at all, without a date in it."""
     metadata = {"Date": None} if path.suffix == ".svg" else {"Software": None}
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            _without_math(axis)
     with rc_context(_STYLE):
         return write_with(path, lambda name: figure.savefig(name, dpi=dpi, metadata=metadata))
+
+
+class _PlainPowers(LogFormatter):
+    """Ticks of a logarithmic axis as plain numbers, where matplotlib would label them."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        return f"{x:g}" if super().__call__(x, pos) else ""
+
+
+def _without_math(axis: Any) -> None:
+    """Replace formatters that write powers of ten as formulas, which are not parsed here."""
+    if isinstance(axis.get_major_formatter(), LogFormatterMathtext):
+        axis.set_major_formatter(_PlainPowers())
+    if isinstance(axis.get_minor_formatter(), LogFormatterMathtext):
+        axis.set_minor_formatter(_PlainPowers())
 
 
 def words(name: str) -> str:

@@ -23,7 +23,7 @@ from castblast.resources import find_spec
 from castblast.specs.balls import BallsSpec
 from castblast.specs.firing import Direction, FiringPlan
 from castblast.specs.ground import GroundSpec, one_or_many
-from castblast.specs.loading import Spec, load_spec
+from castblast.specs.loading import Name, Spec, load_spec
 from castblast.specs.quantity import QuantityError, QuantityIn, convert, convert_variable
 from castblast.variables import VARIABLES
 
@@ -251,7 +251,7 @@ class BenchSpec(Spec):
     notes : str
     """
 
-    name: Annotated[str, Field(min_length=1)]
+    name: Name
     bench: BenchGeometry
     firing: FiringPlan = FiringPlan()
     velocity: Annotated[float, QuantityIn("m s-1", 0.0, 100.0)] | None = None
@@ -264,7 +264,7 @@ class BenchSpec(Spec):
     stop: StopRule = StopRule()
     numerics: Numerics = Numerics()
     ore: Annotated[str, Field(min_length=1)] | None = None
-    seed: Annotated[int, Field(ge=0)] = 0
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     notes: str = ""
 
     @model_validator(mode="after")

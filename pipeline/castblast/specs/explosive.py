@@ -36,7 +36,7 @@ from castblast.explosive.isentrope import (
 from castblast.explosive.remedies import remedies
 from castblast.explosive.table_checks import check_table
 from castblast.specs.catalogue import find_explosive
-from castblast.specs.loading import Spec, load_spec
+from castblast.specs.loading import Label, Spec, load_spec
 from castblast.specs.quantity import QuantityError, QuantityIn, convert
 
 
@@ -134,8 +134,8 @@ class ExplosiveSpec(Spec):
         **dict.fromkeys(("Q", "heat", "Q_v"), "heat_of_explosion"),
     }
 
-    name: Annotated[str, Field(min_length=1)]
-    aliases: tuple[str, ...] = ()
+    name: Label
+    aliases: tuple[Label, ...] = ()
     density: Annotated[float, QuantityIn("kg m-3", 200.0, 4000.0)]
     detonation_velocity: Annotated[float, QuantityIn("m s-1", 1000.0, 10000.0)]
     heat_of_explosion: Annotated[

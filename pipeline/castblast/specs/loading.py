@@ -13,15 +13,22 @@ import types
 import typing
 from collections.abc import Hashable, Mapping
 from pathlib import Path
-from typing import Any, ClassVar, TypeVar
+from typing import Annotated, Any, ClassVar, TypeVar
 
 import yaml
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
 from castblast.errors import SpecError, nearest_name
+from castblast.names import check_label, check_name, shortened
+from castblast.reading import nearest_file as nearest_file
+from castblast.reading import read_text as read_text
 
 M = TypeVar("M", bound=BaseModel)
-_LONGEST_VALUE = 60
+
+
+#: Field of a name that becomes a file or a folder, and of a name for people.
+Name = Annotated[str, AfterValidator(check_name)]
+Label = Annotated[str, AfterValidator(check_label)]
 
 
 class Spec(BaseModel):
@@ -45,12 +52,43 @@ class Spec(BaseModel):
         return hashlib.sha256(content.encode()).hexdigest()
 
 
+#: Most bytes of a YAML file, and most values in it with every alias written out.
+_LARGEST_YAML = 1 << 20
+_MOST_VALUES = 500_000
+#: Longest number; an integer of thousands of digits takes Python minutes to read.
+_LONGEST_NUMBER = 400
+#: Brackets within brackets; PyYAML takes time in proportion to the depth for every sign.
+_DEEPEST = 40
+#: Control characters and halves of pairs; a name of a file or a message cannot hold them.
+_CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff]")
+
+
 class _Loader(yaml.SafeLoader):
-    """Safe YAML loader that refuses duplicate keys and reads ``1e8`` as a number."""
+    """Safe YAML loader of plain values.
+
+    It refuses duplicate keys, reads ``1e8`` as a number and a date as text, knows no tags beside
+    those of plain values, and refuses aliases that stand for more than a file could hold.
+    """
+
+    def fetch_flow_collection_start(self, token: Any) -> None:
+        """Open a bracket."""
+        if self.flow_level >= _DEEPEST:
+            raise yaml.scanner.ScannerError(None, None, "nested too deeply", self.get_mark())
+        super().fetch_flow_collection_start(token)
+
+    def get_single_data(self) -> Any:
+        """Look at the whole document before anything is made of it."""
+        node = self.get_single_node()
+        if node is None:
+            return None
+        _check_nodes(node, {}, set())
+        return self.construct_document(node)
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
         seen: set[Any] = set()
         for key_node, _ in node.value:
+            if key_node.tag.endswith(":merge"):
+                continue
             key = self.construct_object(key_node, deep=True)
             if isinstance(key, Hashable) and key in seen:
                 problem = f"the key '{key}' is given twice"
@@ -59,7 +97,57 @@ class _Loader(yaml.SafeLoader):
                 seen.add(key)
         return super().construct_mapping(node, deep)
 
+    def construct_number(self, node: yaml.ScalarNode) -> int | float:
+        """Make an integer or a float, which a tag of the file may have called one."""
+        if len(node.value) <= _LONGEST_NUMBER:
+            try:
+                if node.tag.endswith("int"):
+                    return int(self.construct_yaml_int(node))
+                return float(self.construct_yaml_float(node))
+            except (ValueError, OverflowError, IndexError):
+                pass
+        problem = f"'{shortened(node.value)}' is not a usable number"
+        raise yaml.constructor.ConstructorError(None, None, problem, node.start_mark)
 
+
+def _check_nodes(node: yaml.Node, known: dict[int, int], above: set[int]) -> int:
+    """Count the values of a node with its aliases written out; `above` holds what it is part of."""
+    if id(node) in known:
+        return known[id(node)]
+    problem = ""
+    count = 1
+    if isinstance(node, yaml.ScalarNode):
+        odd = _CONTROL.search(node.value)
+        problem = f"the character {odd[0]!r} is not allowed" if odd else ""
+    elif id(node) in above:
+        problem = "an alias stands for what it is part of"
+    else:
+        above.add(id(node))
+        for part in node.value:
+            for inner in part if isinstance(part, tuple) else (part,):
+                count += _check_nodes(inner, known, above)
+        above.discard(id(node))
+        if count > _MOST_VALUES:
+            problem = f"holds more than {_MOST_VALUES:,} values once its aliases are written out"
+    if problem:
+        raise yaml.constructor.ConstructorError(None, None, problem, node.start_mark)
+    known[id(node)] = count
+    return count
+
+
+_PLAIN_TAGS = ("null", "bool", "int", "float", "str", "seq", "map", "merge", "value")
+# Dates stay text: nothing here takes one, and YAML makes one of every version like 2024-01-01.
+_Loader.yaml_implicit_resolvers = {
+    first: [(tag, form) for tag, form in forms if not tag.endswith(":timestamp")]
+    for first, forms in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+_Loader.yaml_constructors = {
+    tag: maker
+    for tag, maker in yaml.SafeLoader.yaml_constructors.items()
+    if tag is None or tag.split(":")[-1] in _PLAIN_TAGS
+}
+for _kind in ("int", "float"):
+    _Loader.add_constructor(f"tag:yaml.org,2002:{_kind}", _Loader.construct_number)
 # YAML 1.1 takes a number for text where the mantissa has no point or the exponent no sign.
 _Loader.add_implicit_resolver(
     "tag:yaml.org,2002:float",
@@ -77,27 +165,18 @@ def read_yaml(path: Path) -> dict[str, Any]:
         One line: the file is missing, a folder, unreadable, not UTF-8, empty, broken (with its
         line), has a key twice, or is not a mapping.
     """
-    return parse_yaml(read_text(path), str(path))
+    return parse_yaml(read_yaml_text(path), str(path))
 
 
-def read_text(path: Path) -> str:
-    """Read a text file that a person named.
+def read_yaml_text(path: Path) -> str:
+    """Read the text of a YAML file that a person named.
 
     Raises
     ------
     SpecError
-        One line: the file is missing, a folder, unreadable or not UTF-8.
+        One line: the file is missing, a folder, unreadable, too large or not UTF-8.
     """
-    try:
-        return path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise SpecError(f"{path}: no such file{nearest_file(path)}") from None
-    except IsADirectoryError:
-        raise SpecError(f"{path}: is a folder; a YAML file is needed") from None
-    except UnicodeDecodeError:
-        raise SpecError(f"{path}: is not a text file in UTF-8") from None
-    except OSError as fault:
-        raise SpecError(f"{path}: cannot be read: {fault.strerror}") from None
+    return read_text(path, "YAML file", _LARGEST_YAML)
 
 
 def parse_yaml(text: str, where: str) -> dict[str, Any]:
@@ -114,6 +193,9 @@ def parse_yaml(text: str, where: str) -> dict[str, Any]:
         raise SpecError(_broken(where, fault)) from None
     except RecursionError:
         raise SpecError(f"{where}: nested too deeply") from None
+    except (ValueError, LookupError, AttributeError, TypeError):
+        # PyYAML lets some of these out of a value that carries a tag of its own.
+        raise SpecError(f"{where}: holds a value that cannot be read as its tag says") from None
     if content is None:
         raise SpecError(f"{where}: is empty")
     if not isinstance(content, dict):
@@ -121,7 +203,7 @@ def parse_yaml(text: str, where: str) -> dict[str, Any]:
         raise SpecError(f"{where}: holds {kind}; lines of the form 'key: value' are needed")
     odd = [key for key in content if not isinstance(key, str)]
     if odd:
-        raise SpecError(f"{where}: the key {odd[0]!r} is not a name")
+        raise SpecError(f"{where}: the key {shortened(odd[0])} is not a name")
     return content
 
 
@@ -153,15 +235,6 @@ def make_spec(
         raise SpecError("\n".join(lines)) from None
 
 
-def nearest_file(path: Path) -> str:
-    """Return a hint at the file of that folder whose name is nearest, or an empty string."""
-    try:
-        names = [entry.name for entry in path.parent.iterdir() if entry.suffix == path.suffix]
-    except OSError:
-        return f": the folder {path.parent} does not exist"
-    return nearest_name(path.name, names)
-
-
 def _broken(where: str, fault: yaml.YAMLError) -> str:
     mark = getattr(fault, "problem_mark", None) or getattr(fault, "context_mark", None)
     problem = getattr(fault, "problem", None) or getattr(fault, "reason", None) or "not YAML"
@@ -188,15 +261,15 @@ def _is_written(part: int | str) -> bool:
 def _field_path(place: tuple[int | str, ...]) -> str:
     path = ""
     for part in place:
-        path += f"[{part}]" if isinstance(part, int) else f".{part}" if path else part
+        if isinstance(part, int):
+            path += f"[{shortened(part)}]"
+        else:
+            path += f".{shortened(part)}" if path else shortened(part)
     return path
 
 
 def _show(value: object) -> str:
-    if isinstance(value, Mapping):
-        return ""
-    text = str(value).replace("\n", " ")
-    return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 3] + "..."
+    return "" if isinstance(value, Mapping) else shortened(value)
 
 
 def _describe(

@@ -8,8 +8,9 @@ from typing import Any, ClassVar, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from castblast.errors import nearest_name
+from castblast.names import is_variable
 from castblast.network import Transform
-from castblast.specs.loading import Spec
+from castblast.specs.loading import Name, Spec
 from castblast.specs.search import SearchSpace
 from castblast.variables import INPUT_NAMES, OUTPUT_NAMES, VARIABLES
 
@@ -98,7 +99,7 @@ class SurrogateSpec(Spec):
     #: Extras of castblast that the family needs besides what all families need.
     needs: ClassVar[tuple[str, ...]] = ()
 
-    name: str = Field(min_length=1, pattern=r"^[a-z0-9_]+$")
+    name: Name
     description: str = ""
     features: tuple[str, ...] = Field(PAPER_FEATURES, min_length=1)
     targets: tuple[str, ...] = Field(PAPER_TARGETS, min_length=1)
@@ -138,6 +139,8 @@ class SurrogateSpec(Spec):
                 if name not in allowed
             ]
         for column, entry in self.derived.items():
+            if not is_variable(column):
+                faults.append(f"derived: '{column}': small letters, digits and '_' are allowed")
             if column in VARIABLES:
                 faults.append(f"derived: '{column}' is the name of a variable; take another")
             missing = [name for name in entry.coefficients if features and name not in features]

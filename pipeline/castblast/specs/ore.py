@@ -17,7 +17,7 @@ from pydantic import Field
 from castblast.errors import SpecError
 from castblast.muckpile.bench import Bench
 from castblast.muckpile.ore import OrePolygon
-from castblast.specs.loading import Spec, load_spec, make_spec
+from castblast.specs.loading import Label, Spec, load_spec, make_spec
 from castblast.specs.quantity import QuantityIn
 from castblast.specs.table import Form, read_table
 
@@ -37,7 +37,7 @@ _Corner = Annotated[list[float], Field(min_length=2, max_length=2)]
 class OrePolygonSpec(Spec):
     """One polygon: name, corners (x, y) in m, and a grade in the unit of the user."""
 
-    name: Annotated[str, Field(min_length=1)]
+    name: Label
     corners: Annotated[list[_Corner], Field(min_length=3)]
     grade: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] | None = None
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from castblast.errors import SpecError, nearest_name
+from castblast.names import shortened
 from castblast.specs.units import QuantityError, convert
 from castblast.variables import VARIABLES, Variable
 
@@ -58,7 +59,7 @@ def allowed(variable: Variable) -> str:
 
 def _placed(fault: QuantityError, value: object, where: str) -> SpecError:
     prefix = f"{where}: " if where else ""
-    return SpecError(f"{prefix}{value}: {fault}")
+    return SpecError(f"{prefix}{shortened(value)}: {fault}")
 
 
 def parse_quantity(value: object, unit: str, where: str = "") -> float:

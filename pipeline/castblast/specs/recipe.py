@@ -18,7 +18,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from castblast.errors import nearest_name
 from castblast.resources import find_spec
 from castblast.specs.case import ModeName, TensionName
-from castblast.specs.loading import Spec, make_spec, parse_yaml, read_text
+from castblast.specs.loading import Name, Spec, make_spec, parse_yaml, read_yaml_text
 from castblast.specs.quantity import QuantityIn, convert, convert_variable
 from castblast.variables import INPUTS, VARIABLES, Variable
 
@@ -260,14 +260,14 @@ class Recipe(Spec):
         so, and there should be many per worker, so that all end at nearly the same time.
     """
 
-    name: str
+    name: Name
     version: str
     title: str = Field(min_length=1)
     summary: str = ""
     license: str = "CC-BY-4.0"
     creator: str = "the castblast developers"
     size: int = Field(ge=1, le=100_000_000)
-    seed: int = Field(ge=0)
+    seed: int = Field(ge=0, lt=2**63)
     explosives: tuple[str, ...] = Field(min_length=1, max_length=100)
     variables: dict[str, VariableSpec]
     constraints: Constraints = Constraints()
@@ -277,18 +277,12 @@ class Recipe(Spec):
     max_failed_share: float = Field(default=0.01, ge=0.0, le=1.0)
     shard_size: int = Field(default=500, ge=1, le=1_000_000)
 
-    @field_validator("name")
-    @classmethod
-    def _folder_name(cls, name: str) -> str:
-        if not re.fullmatch(r"[a-z][a-z0-9_-]{0,63}", name):
-            message = "lower-case letters, digits, '-' and '_' are allowed, a letter first"
-            raise ValueError(message)
-        return name
-
     @field_validator("version", mode="before")
     @classmethod
     def _three_numbers(cls, version: object) -> object:
-        if not re.fullmatch(r"\d+\.\d+\.\d+", str(version)):
+        if not isinstance(version, str) or not re.fullmatch(
+            r"(?:[0-9]{1,6}\.){2}[0-9]{1,6}", version
+        ):
             message = "three numbers are needed, such as 1.0.0"
             raise ValueError(message)
         return version
@@ -383,7 +377,7 @@ def load_recipe(path: Path, size: int | None = None) -> RecipeSource:
         One line for every fault.
     """
     path = find_spec(path, "recipe")
-    text = read_text(path)
+    text = read_yaml_text(path)
     content = parse_yaml(text, str(path))
     if size is not None and size != content.get("size"):
         content["size"] = size

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from castblast.errors import nearest_name
+from castblast.names import shortened
 
 _PREFIXES = (
     "nano- = 1e-9 = n-",
@@ -100,7 +101,15 @@ _NUMBER = re.compile(
 )
 _POWER = re.compile(r"([A-Za-zµμ°]+)(?:\^|\*\*)?([+-]?\d+)")
 _SYMBOL = re.compile(r"[A-Za-zµμ°]+")
-_WRITABLE = re.compile(r"[A-Za-zµμ°0-9*/().+\-\s]*")
+#: A unit as a product of powers. What is left of it without its powers is one of a few signs:
+#: no power of a power, and no number, so that nobody can ask for 9^9^9.
+_FACTOR = re.compile(
+    r"(?:[A-Za-zµμ°]+(?:(?:\^|\*\*)?[+-]?[0-9]{1,2}(?![0-9]))?|\)(?:\^|\*\*)[+-]?[0-9](?![0-9])"
+    r"|(?<![0-9])1\s*/)"
+)
+_SIGNS = re.compile(r"(?:[()/\s]|\*(?!\*))*")
+#: Longest text of a value, and of its unit.
+_LONGEST, _LONGEST_UNIT = 200, 60
 
 
 class QuantityError(ValueError):
@@ -148,13 +157,20 @@ def _factor(written: str, unit: str) -> float:
         message = f"unknown unit '{name}'{hint}"
         raise QuantityError(message) from None
     except Exception:  # pint leaks tokenizer, syntax and attribute errors on odd text
-        message = f"'{written}' is not a unit; {needs(unit)}"
+        message = f"'{shortened(written)}' is not a unit; {needs(unit)}"
         raise QuantityError(message) from None
     target = registry.parse_units(_to_expression(unit))
     if source.dimensionality != target.dimensionality:
-        message = f"'{written}' is {_dimension_name(source)}; {needs(unit)}"
+        message = f"'{shortened(written)}' is {_dimension_name(source)}; {needs(unit)}"
         raise QuantityError(message)
-    return float(registry.convert(1.0, source, target))
+    try:
+        factor = float(registry.convert(1.0, source, target))
+    except (ArithmeticError, ValueError):
+        factor = math.nan
+    if not 0.0 < factor < math.inf:
+        message = f"'{shortened(written)}' is not a unit; {needs(unit)}"
+        raise QuantityError(message)
+    return factor
 
 
 def _to_expression(unit: str) -> str:
@@ -163,8 +179,8 @@ def _to_expression(unit: str) -> str:
     text = text.replace("²", "2").replace("^", "**")
     if text in ("", "1"):
         return "dimensionless"
-    if not _WRITABLE.fullmatch(text):
-        message = f"'{unit}' is not a unit"
+    if len(text) > _LONGEST_UNIT or not _SIGNS.fullmatch(_FACTOR.sub(" ", text)):
+        message = f"'{shortened(unit)}' is not a unit"
         raise QuantityError(message)
     text = _POWER.sub(r"\1**(\2)", text)
     return re.sub(r"(?<=[\w)°])\s+(?=[A-Za-zµμ°(])", " * ", text)
@@ -208,11 +224,18 @@ def convert(value: object, unit: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         message = f"not a quantity; {needs(unit)}"
         raise QuantityError(message)
+    if isinstance(value, str) and len(value) > _LONGEST:
+        message = f"is too long; {needs(unit)}"
+        raise QuantityError(message)
     number, written = _split(value, unit)
     if not math.isfinite(number):
         message = f"not a finite number; {needs(unit)}"
         raise QuantityError(message)
-    return scaled(number, unit_factor(written, unit))
+    result = scaled(number, unit_factor(written, unit))
+    if not math.isfinite(result):
+        message = f"not a finite number; {needs(unit)}"
+        raise QuantityError(message)
+    return result
 
 
 def unit_factor(written: str, unit: str) -> float:
@@ -234,7 +257,10 @@ def unit_factor(written: str, unit: str) -> float:
 def _split(value: float | str, unit: str) -> tuple[float, str]:
     """Number and unit text of a written value."""
     if not isinstance(value, str):
-        return float(value), ""
+        try:
+            return float(value), ""
+        except OverflowError:  # an integer beyond the largest float
+            return math.inf, ""
     match = _NUMBER.fullmatch(value)
     if match is None:
         comma = re.match(r"\s*[+-]?\d+,\d", value)
