@@ -4,13 +4,18 @@ VENV   ?= .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: demo test lint format bench clean
+.PHONY: demo test shuffle lint format bench readme clean
+
+PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 
 demo: $(VENV)/.demo          ## the whole chain at a small size; ends with demo/report.html
 	$(BIN)/castblast demo --out demo
 
 test: $(VENV)/.dev lint      ## linters, then the whole test suite
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder
+	$(PYTEST) --no-loadscope-reorder -p no:randomly
+
+shuffle: $(VENV)/.dev        ## the suite in random order: make shuffle SEED=7
+	$(PYTEST) $(if $(SEED),--randomly-seed=$(SEED) --hypothesis-seed=$(SEED))
 
 lint: $(VENV)/.dev           ## ruff, mypy --strict, import layers
 	$(BIN)/ruff check .
@@ -26,6 +31,9 @@ format: $(VENV)/.dev
 bench: $(VENV)/.dev          ## speed figures, as ratios
 	$(BIN)/python -m pytest tests/bench --benchmark-only --benchmark-disable-gc -s
 
+readme:                      ## the commands of the README, after the README's own installation
+	$(PYTHON) .ci/readme.py
+
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
 
@@ -38,4 +46,4 @@ $(VENV)/.dev: pyproject.toml constraints.txt | $(VENV)/bin/python
 	touch $@ $(VENV)/.demo
 
 clean:
-	rm -rf demo data build dist .pytest_cache .mypy_cache .ruff_cache
+	rm -rf demo data mine simulation muckpile other_muckpile next.csv build dist .pytest_cache .mypy_cache .ruff_cache
