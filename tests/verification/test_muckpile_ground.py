@@ -85,6 +85,22 @@ def test_rebound_from_a_flat_mesh_is_that_from_the_plane_everywhere(velocity):
     assert (on_plane[:, 2] > R).all()
 
 
+@pytest.mark.parametrize("apart", [1e-12, 1e-6, 2e-4])
+def test_rebound_where_the_corners_of_neighbours_do_not_quite_meet(apart):
+    """Dropped at 3 m/s over a facet, a diagonal, an edge and a corner: 1.08 m/s as from a plane.
+
+    Two facets that only lie side by side would both push, and 0.53 m/s would be left.
+    """
+    corner = flat().corner.copy()
+    corner[:, :, :2] += np.random.default_rng(0).uniform(-apart, apart, corner[:, :, :2].shape)
+    plan = [(-0.69, -0.61), (0.6, -0.65), (-0.5, 0.61), (0.5, 0.5)]
+    start = [(*place, 0.3) for place in plan]
+    loose = outcome(surface(corner), start, (0.0, 0.0, -3.0), until=0.15)
+    on_plane = outcome(floor(), start, (0.0, 0.0, -3.0), until=0.15)
+    np.testing.assert_allclose(loose, on_plane, atol=1e-6)
+    np.testing.assert_allclose(loose[:, 5], 1.0754, atol=2e-4)
+
+
 @pytest.mark.parametrize("place", [(0.0, 0.0), (0.25, 0.1), (0.13, 0.13), (0.2, 0.07)])
 def test_a_ball_rests_on_a_mesh_as_deep_as_on_a_plane(place):
     """D = m g/k_n on a corner, an edge, a diagonal and a facet."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import inf, nan
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from castblast.kernel import kernel
 from castblast.muckpile.facet_table import corner_numbers, edge_numbers
@@ -34,8 +34,59 @@ _THINNEST = 1e-6
 _NAMED = 3
 
 
+def complete_cells(height: FloatArray) -> NDArray[np.bool_]:
+    """Cells (ny - 1, nx - 1) of a grid of heights (ny, nx) with a height at all four corners."""
+    known = np.isfinite(height)
+    return known[:-1, :-1] & known[:-1, 1:] & known[1:, :-1] & known[1:, 1:]
+
+
+def missing_heights(height: FloatArray) -> str:
+    """Say how many heights (ny, nx) are missing and what is left out for it; empty: none."""
+    missing = int((~np.isfinite(height)).sum())
+    if not missing:
+        return ""
+    cells = int((~complete_cells(height)).sum())
+    return (
+        f"{missing} height{'s' if missing > 1 else ''} missing of {height.size}: "
+        f"{cells} of {(height.shape[0] - 1) * (height.shape[1] - 1)} cells have a missing corner "
+        f"and make no facet"
+    )
+
+
+def _missing_faults(height: FloatArray) -> list[str]:
+    """Heights may be missing at the border only, where the surface may end."""
+    from scipy.ndimage import label
+
+    known = np.isfinite(height)
+    if known.all():
+        return []
+    row, column = np.argwhere(~known)[0]
+    complete = complete_cells(height)
+    place = f"first in row {row}, column {column}"
+    count = f"height: {(~known).sum()} of {height.size} values are missing or not numbers"
+    if not complete.any():
+        return [f"{count}, {place}; no cell has all four corners"]
+    gap, _ = label(~complete, structure=np.ones((3, 3)))
+    outside = np.unique(np.concatenate([gap[0], gap[-1], gap[:, 0], gap[:, -1]]))
+    inside = ~np.isin(gap, outside) & ~complete
+    if not inside.any():
+        return []
+    # Any cell of a hole has a missing corner; name the first of them.
+    around = np.zeros(height.shape, np.bool_)
+    for i in (0, 1):
+        for j in (0, 1):
+            around[i : i + inside.shape[0], j : j + inside.shape[1]] |= inside
+    row, column = np.argwhere(around & ~known)[0]
+    return [
+        f"{count}; they leave a hole, first in row {row}, column {column}: fill it, since balls "
+        f"would fall to the floor in it"
+    ]
+
+
 def height_faults(x: FloatArray, y: FloatArray, height: FloatArray) -> list[str]:
     """Return every fault of a grid of heights in words; rows and columns count from 0.
+
+    A height that is no number is missing: no fault at the border, see `missing_heights`.
 
     Parameters
     ----------
@@ -54,13 +105,8 @@ def height_faults(x: FloatArray, y: FloatArray, height: FloatArray) -> list[str]
             faults.append(f"{name}: must rise, place {first + 1} is not above place {first}")
     if height.shape != (len(y), len(x)):
         faults.append(f"height: shape {height.shape}; (ny, nx) = ({len(y)}, {len(x)}) is needed")
-    elif not np.isfinite(height).all():
-        row, column = np.argwhere(~np.isfinite(height))[0]
-        count = int((~np.isfinite(height)).sum())
-        faults.append(
-            f"height: {count} of {height.size} values are missing or not numbers, "
-            f"first in row {row}, column {column}"
-        )
+    elif min(height.shape) > 1:
+        faults += _missing_faults(height)
     return faults
 
 
@@ -79,6 +125,7 @@ def heightmap(
     x, y : array_like (nx,), (ny,) [m]
         Places of the grid, rising.
     height : array_like (ny, nx) [m]
+        NaN where it is missing: cells with such a corner make no facet.
     friction : float
         Used for sliding and for rolling; NaN: that of the contact law.
     base : float [m]
@@ -102,22 +149,38 @@ def heightmap(
     lower = np.where(split, np.stack([a, b, c], axis=-2), np.stack([a, b, d], axis=-2))
     upper = np.where(split, np.stack([a, c, d], axis=-2), np.stack([b, c, d], axis=-2))
     corner = np.stack([lower, upper], axis=2).reshape(-1, 3, 3)
-    above = (corner[:, :, 2] > base).any(axis=1)
-    ground = surface(corner[above], friction, depth=GROUND_DEPTH, base=base)
+    complete = complete_cells(z)
+    above = (corner[:, :, 2] > base).any(axis=1) & np.repeat(complete.ravel(), 2)
+    ground = surface(corner[above], friction, depth=GROUND_DEPTH, base=base, welded=True)
     if base == -inf:
         return ground
-    return join(ground, surface(_end_faces(point, base), friction, base=base))
+    ends = _end_faces(*_border(point, complete), base)
+    return join(ground, surface(ends, friction, base=base, welded=True))
 
 
-def _end_faces(point: FloatArray, base: float) -> FloatArray:
-    """Vertical facets (t, 3, 3) [m] below the border of a grid (ny, nx, 3) [m], to below `base`.
+def _border(point: FloatArray, complete: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
+    """Starts and ends (k, 3) [m] of the edges around the cells of a grid (ny, nx, 3) that are."""
+    ring = np.concatenate([point[0, :-1], point[:-1, -1], point[-1, :0:-1], point[:0:-1, 0]])
+    cells = [complete[0], complete[:, -1], complete[-1, ::-1], complete[::-1, 0]]
+    there = np.concatenate(cells)
+    start, end = [ring[there]], [np.roll(ring, -1, axis=0)[there]]
+    # Edges inside the grid, as those of its rim counter-clockwise around the cell that is there.
+    up, right = complete[:-1] & ~complete[1:], complete[:, :-1] & ~complete[:, 1:]
+    down, left = complete[1:] & ~complete[:-1], complete[:, 1:] & ~complete[:, :-1]
+    west, east = point[1:-1, :-1], point[1:-1, 1:]
+    south, north = point[:-1, 1:-1], point[1:, 1:-1]
+    start += [west[down], south[right], east[up], north[left]]
+    end += [east[down], north[right], west[up], south[left]]
+    return np.concatenate(start), np.concatenate(end)
+
+
+def _end_faces(border: FloatArray, after: FloatArray, base: float) -> FloatArray:
+    """Vertical facets (t, 3, 3) [m] below edges from `border` to `after` (k, 3), to below `base`.
 
     They hold little more than their face: behind them balls may lie in a hollow of the ground.
     """
-    border = np.concatenate([point[0, :-1], point[:-1, -1], point[-1, :0:-1], point[:0:-1, 0]])
-    foot = border.copy()
-    foot[:, 2] = min(base, border[:, 2].min()) - 1.0
-    after, foot_after = np.roll(border, -1, axis=0), np.roll(foot, -1, axis=0)
+    foot, foot_after = border.copy(), after.copy()
+    foot[:, 2] = foot_after[:, 2] = min(base, border[:, 2].min()) - 1.0
     facets = np.stack(
         [
             np.stack([foot, foot_after, after], axis=1),
@@ -129,48 +192,54 @@ def _end_faces(point: FloatArray, base: float) -> FloatArray:
     return np.asarray(facets[rises].reshape(-1, 3, 3))
 
 
-def surface_faults(corner: FloatArray) -> list[str]:
+def surface_faults(corner: FloatArray, source: IntArray | None = None) -> list[str]:
     """Return every fault of facets (t, 3, 3) [m] in words; facets count from 0.
 
     Facets must be triangles, meet along whole edges, two at most, be turned alike, and leave no
-    hole: a surface may end, but its rim must be one.
+    hole: a surface may end, but its rim must be one. Facets are named by `source` (t,), if given.
     """
+    named = np.arange(len(corner)) if source is None else source
+
+    def line(bad: IntArray, what: str) -> str:
+        return f"facets {what}: {named_facets(named[bad])}"
+
     if not len(corner):
         return ["there is no facet"]
     bad = np.flatnonzero(~np.isfinite(corner).all(axis=(1, 2)))
     if len(bad):
-        return [_line(bad, "have a corner that is not a number")]
+        return [line(bad, "have a corner that is not a number")]
     side = np.linalg.norm(corner - np.roll(corner, -1, axis=1), axis=2).max(axis=1)
     across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     bad = np.flatnonzero(~(np.linalg.norm(across, axis=1) > _THINNEST * side**2))
     if len(bad):
-        return [_line(bad, "have no area")]
+        return [line(bad, "have no area")]
     number, _ = corner_numbers(corner)
     edge, _, meeting = edge_numbers(number)
     faults = []
     bad = np.flatnonzero((meeting > 2)[edge].any(axis=1))
     if len(bad):
-        faults.append(_line(bad, "share an edge with more than one other facet"))
+        faults.append(line(bad, "share an edge with more than one other facet"))
     forward = number < np.roll(number, -1, axis=1)
     turns = np.zeros(len(meeting), dtype=np.int64)
     np.add.at(turns, edge.ravel(), np.where(forward, 1, -1).ravel())
     bad = np.flatnonzero(((meeting == 2) & (turns != 0))[edge].any(axis=1))
     if len(bad):
-        faults.append(_line(bad, "are turned the other way than a neighbour"))
+        faults.append(line(bad, "are turned the other way than a neighbour"))
     if not faults:
-        faults += _hole_faults(edge, number, meeting)
+        holes = _holes(edge, number, meeting)
+        faults += [line(holes, "lie at the rim of a hole")] if len(holes) else []
     return faults
 
 
-def _hole_faults(edge: IntArray, number: IntArray, meeting: IntArray) -> list[str]:
-    """Holes: rims beyond the first of every connected surface."""
+def _holes(edge: IntArray, number: IntArray, meeting: IntArray) -> IntArray:
+    """A facet of each hole: rims beyond the longest of every connected surface."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     ends = np.stack([number, np.roll(number, -1, axis=1)], axis=-1)
     at_rim = (meeting == 1)[edge]
     if not at_rim.any():
-        return []
+        return np.zeros(0, np.int64)
     size = int(number.max()) + 1
 
     def label(pairs: IntArray) -> IntArray:
@@ -186,18 +255,19 @@ def _hole_faults(edge: IntArray, number: IntArray, meeting: IntArray) -> list[st
     )
     holes = len(pairs) - len(np.unique(pairs[:, 0]))
     if holes == 0:
-        return []
+        return np.zeros(0, np.int64)
     # The longest rim of a piece is its outside; name a facet of the others.
     length = np.bincount(rim[starts])[pairs[:, 1]]
     order = np.lexsort((-length, pairs[:, 0]))
     later = np.flatnonzero(np.diff(pairs[order, 0]) == 0) + 1
-    return [_line(np.sort(facet[first[order[later]]]), "lie at the rim of a hole")]
+    return np.sort(facet[first[order[later]]])
 
 
-def _line(bad: IntArray, what: str) -> str:
+def named_facets(bad: IntArray) -> str:
+    """Write the first of some numbers of facets: ``facet 3, 7, 8 and 12 more``."""
     named = ", ".join(str(k) for k in bad[:_NAMED])
     more = f" and {len(bad) - _NAMED} more" if len(bad) > _NAMED else ""
-    return f"facets {what}: facet {named}{more}"
+    return f"facet {named}{more}"
 
 
 def wall_faults(

@@ -27,6 +27,7 @@ from castblast.muckpile.facets import (
     facet_height,
     near_facets,
 )
+from castblast.muckpile.mend import weld, weld_distance
 from castblast.muckpile.particles import FloatArray
 
 __all__ = ["WallTable", "Walls", "bench_walls", "floor", "ground_height", "join", "near_walls"]
@@ -148,9 +149,16 @@ def floor(height: float = 0.0) -> Walls:
 
 
 def surface(
-    corner: ArrayLike, friction: float = nan, *, depth: float = SHEET_DEPTH, base: float = -inf
+    corner: ArrayLike,
+    friction: float = nan,
+    *,
+    depth: float = SHEET_DEPTH,
+    base: float = -inf,
+    welded: bool = False,
 ) -> Walls:
     """Facets of one surface.
+
+    Corners closer together than `castblast.muckpile.mend.weld_distance` become one.
 
     Parameters
     ----------
@@ -164,8 +172,11 @@ def surface(
     base : float [m]
         Rims of the surface that lie no higher than this cannot be touched: a surface that ends on
         a floor at this height goes over into it.
+    welded : bool
+        Neighbours are known to share their corners to the last bit.
     """
     corners = np.array(corner, dtype=np.float64).reshape(-1, 3, 3)
+    corners = corners if welded else weld(corners, weld_distance(corners))[0]
     share = np.full(len(corners), friction)
     none = np.zeros((0, 3))
     return Walls(
