@@ -7,6 +7,7 @@ record can be held against that law.
 import json
 import re
 import shutil
+import subprocess
 from html.parser import HTMLParser
 from math import exp, log, pi
 from typing import Any
@@ -17,14 +18,16 @@ import xarray as xr
 from toy_network import toy_network
 
 from castblast.bands import BASIS, THROW_FACTOR, THROW_SD
+from castblast.design import complete_columns, design_faults, fault_columns, rules_as_data
 from castblast.errors import SpecError
 from castblast.export.parity import check_parity
 from castblast.export.runners import run_program, written
 from castblast.export.web import PAGE, to_web
 from castblast.muckpile.ballistic import block_throw
-from castblast.network import Network, predict_rows
+from castblast.network import Network, keeps_ranges_and_rules, predict_rows
 from castblast.resources import resource
 from castblast.stages.export import export
+from castblast.stages.predict import load_network
 from castblast.stages.web import build_page, shipped_page
 from castblast.surrogate.history_modes import FORMAT, fit_history_modes
 
@@ -244,3 +247,145 @@ def test_the_shipped_page_is_there(tmp_path) -> None:
     copy = shipped_page(tmp_path)
     assert copy.name == "index.html"
     assert copy.read_bytes() == shipped_page().read_bytes()
+
+
+# the rule of a design
+
+
+@pytest.fixture(scope="module", params=["full", "paper"])
+def ask(request, tmp_path_factory):
+    """Network, and a function that evaluates an expression with the scripts of its page."""
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("node is not installed")
+    network = load_network(request.param)
+    text = to_web(network)[PAGE].decode().split('<script type="module">')[1]
+    scripts = text.split("/* The page: one state")[0].replace("<\\/", "</")
+    file = tmp_path_factory.mktemp("page") / "ask.mjs"
+
+    def evaluated(expression: str):
+        file.write_text(f"{scripts}\nconsole.log(JSON.stringify({expression}));\n")
+        done = subprocess.run([node, file], capture_output=True, text=True, check=True)
+        return json.loads(done.stdout)
+
+    return network, evaluated
+
+
+def as_charged(network, values: dict) -> dict:
+    """The inputs of a network for a design, without a check."""
+    full = {n: float(c[0]) for n, c in complete_columns(values, 1).items()}
+    return {name: full[name] for name in network.input_names}
+
+
+DESIGNS = (
+    {},
+    {"burden": 4.0, "spacing": 5.0, "bench_height": 15.0},
+    {"stemming_length": 14.0},
+    {"stemming_length": 11.9},
+    {"burden": 0.25, "hole_diameter": 0.6},
+    {"bench_height": 5.0, "burden": 6.0},
+    {"dilation_angle": 0.9},
+    {"burden": 40.0},
+)
+
+
+def test_the_page_refuses_and_completes_as_the_rule_does(ask) -> None:
+    """14 m of stemming in a bench of 12.5 m: no answer, and not a charge of -1.5 m."""
+    network, evaluated = ask
+    rows = [as_charged(network, values) for values in DESIGNS]
+    found = evaluated(
+        f"{json.dumps(rows)}.map((values) => "
+        "[refusals({ values }, 'metric'), completed({ values })])"
+    )
+    for row, (reasons, full) in zip(rows, found, strict=True):
+        faults = fault_columns(row, 1)
+        assert len(reasons) == sum(bool(fault.rows[0]) for fault in faults), row
+        truth = {n: float(c[0]) for n, c in complete_columns(row, 1).items()}
+        for name in ("spacing", "charge_diameter", "stemming_length", "charge_length"):
+            assert full[name] == truth[name]
+    assert found[0][0] == []
+    assert any("no room" in reason or "plausible" in reason for reason in found[2][0])
+    assert "plausible: 0.2" in " ".join(found[-1][0])
+
+
+def test_the_page_carries_the_rule_as_data(page: str) -> None:
+    """No number of the rule stands in a script: another rule in Python is another page."""
+    assert json.dumps(rules_as_data(), separators=(",", ":")) in page
+    scripts = page.split('"rule":')[1].split("/* Units:")[1]
+    assert "0.7 *" not in scripts
+    assert "?? full.burden" not in scripts
+
+
+def test_refusals_are_said_in_words_and_in_the_units_of_the_reader(ask) -> None:
+    network, evaluated = ask
+    row = as_charged(network, {"stemming_length": 12.0})
+    if "stemming_length" not in network.input_names:
+        row["charge_length"] = 0.5
+    metric, us = evaluated(
+        f"['metric', 'us'].map((system) => refusals({{ values: {json.dumps(row)} }}, system)[0])"
+    )
+    metric, us = metric.replace("\u00a0", " "), us.replace("\u00a0", " ")
+    assert metric.startswith(
+        "Charge length 0.5000 m leaves no room for a column charge: at least 6"
+    )
+    assert "0.9000 m" in metric
+    assert "1.640 ft" in us
+    assert "_" not in metric + us
+
+
+def test_a_table_of_designs_tells_impossible_ones_by_line(ask) -> None:
+    network, evaluated = ask
+    good = as_charged(network, {})
+    bad = good | {"bench_height": 2.0}
+    text = "\n".join(
+        [
+            "explosive," + ",".join(network.input_names),
+            *(",".join(["anfo", *(repr(v) for v in row.values())]) for row in (good, bad)),
+        ]
+    )
+    found = evaluated(f"answerBatch({json.dumps(text)})")
+    assert len(found["rows"]) == 1
+    assert found["faults"]
+    assert all(fault.startswith("line 3: ") for fault in found["faults"])
+
+
+def test_spacing_and_stemming_go_with_the_burden(ask) -> None:
+    """Ratios 1.2 and 0.8 at a burden of 3 m are kept at 4.5 m."""
+    network, evaluated = ask
+    row = as_charged(network, {"burden": 3.0, "spacing": 3.6, "stemming_length": 2.4})
+    design = json.dumps({"explosive": "anfo", "values": row})
+    moved = evaluated(f"completed({{ values: valuesAtBurden({design}, 4.5, ratiosOf({design})) }})")
+    assert moved["burden"] == 4.5
+    assert moved["stemming_length"] == pytest.approx(0.8 * 4.5)
+    spacing = 1.2 * 4.5 if "spacing" in network.input_names else 4.5
+    assert moved["spacing"] == pytest.approx(spacing)
+
+
+def test_the_shaded_range_is_where_the_design_stays_valid(ask) -> None:
+    """Each step of each slider against Python: possible, and not outside the domain."""
+    network, evaluated = ask
+    row = as_charged(network, {})
+    design = {"explosive": "anfo", "values": row}
+    for name in ("burden", "bench_height", "hole_diameter"):
+        column = next(c for c in network.inputs if c.name == name)
+        found = evaluated(
+            f"validRange({json.dumps(design)}, network.inputs.find((c) => c.name === '{name}'), "
+            f"ratiosOf({json.dumps(design)}))"
+        )
+        steps = np.geomspace(column.lower, column.upper, 41)
+        steps[[0, -1]] = column.lower, column.upper
+        expected = []
+        for x in steps.tolist():
+            moved = row | {name: x}
+            if name == "burden":
+                share = {"spacing": 1.0, "stemming_length": 0.7}
+                moved |= {n: r * x for n, r in share.items() if n in row}
+                if "charge_length" in row:
+                    moved["charge_length"] = row["bench_height"] - 0.7 * x
+            numeric = np.array([[moved[n] for n in network.input_names]])
+            outside = not keeps_ranges_and_rules(network, numeric)[0]
+            expected.append("impossible" if design_faults(moved) else outside)
+        assert len(found["domains"]) == 41
+        for kind, truth in zip(found["domains"], expected, strict=True):
+            assert kind == truth if isinstance(truth, str) else (kind == "outside") == truth
+        assert column.lower <= found["lower"] < found["upper"] <= column.upper

@@ -85,9 +85,40 @@ def test_bad_input_is_marked_and_answers_vanish(page) -> None:
 
 
 def test_outside_is_red_with_the_reason(page) -> None:
-    page.locator("#field-burden").fill("40")
+    page.locator("#field-burden").fill("16")
     assert page.locator("#domain").get_attribute("data-domain") == "outside"
-    assert "Burden at the crest is 40" in page.locator("#domain").inner_text()
+    assert "Burden at the crest is 16" in page.locator("#domain").inner_text()
+
+
+def test_a_design_that_no_bench_can_hold_has_no_answer(page) -> None:
+    """14 m of stemming in 12.5 m of bench: no length below zero, no powder factor, no NaN."""
+    page.locator("#field-stemming_length").fill("14")
+    words = page.locator("#domain").inner_text()
+    assert "No bench can hold this design" in words
+    assert "leaves no room for a column charge" in words
+    assert page.locator("#results li").count() == 0
+    assert page.locator("#keep").is_disabled()
+    assert "NaN" not in page.locator("main").inner_text()
+    page.locator("#field-stemming_length").fill("2.5")
+    assert page.locator("#results li").count() > 0
+
+
+def test_the_burden_slider_takes_spacing_and_stemming_along(page) -> None:
+    page.locator("#field-spacing").fill("3.6")
+    page.locator("#slider-burden").evaluate(
+        "(slider) => { slider.value = 500; slider.dispatchEvent(new Event('input')); }"
+    )
+    values = page.evaluate("castblast.state.design.values")
+    assert values["burden"] > 3.3
+    assert values["spacing"] / values["burden"] == pytest.approx(1.2)
+    assert values["stemming_length"] / values["burden"] == pytest.approx(0.7)
+    page.locator("#field-burden").fill("3")
+    assert page.evaluate("castblast.state.design.values.spacing") == values["spacing"]
+
+
+def test_the_valid_part_of_a_slider_is_shaded_and_said(page) -> None:
+    page.locator("#hint-burden", has_text="valid here").wait_for()
+    assert "gradient" in page.locator("#valid-burden").evaluate("(s) => s.style.background")
 
 
 def test_units_change_the_display_only(page) -> None:

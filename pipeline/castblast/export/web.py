@@ -14,20 +14,21 @@ from pathlib import Path
 from typing import Any
 
 from castblast.bands import THROW_FACTOR, THROW_SD, throw_band_factor
+from castblast.design import COMPLETED, rules_as_data
 from castblast.errors import SpecError
 from castblast.export.answers import Answers
 from castblast.export.javascript import to_javascript
 from castblast.export.plain import Files, compact, render
 from castblast.export.runners import Index, run_js
 from castblast.network import Floats, Network
-from castblast.variables import STEMMING_RATIO, VARIABLES
+from castblast.variables import VARIABLES
 
 PAGE = "index.html"
 _FOLDER = Path(__file__).parent / "templates" / "web"
 #: In the order in which they need each other; names at their top level differ.
 _SCRIPTS = (
-    "units", "design", "histories", "answers", "domain", "drawing", "figures", "batch", "controls",
-    "page",
+    "units", "rule", "design", "histories", "answers", "domain", "drawing", "figures", "batch",
+    "controls", "page",
 )  # fmt: skip
 _IMPORT = re.compile(r"^import .*?;\n", re.MULTILINE | re.DOTALL)
 _EXPORT = re.compile(r"^export ", re.MULTILINE)
@@ -77,10 +78,10 @@ def _facts(network: Network, histories: Mapping[str, Any] | None) -> dict[str, A
     held = network.provenance.get("held_inputs", {})
     return {
         "explosives": {name: _explosive(name) for name in network.explosives},
-        "held": {name: value for name, value in held.items() if name in VARIABLES},
-        "defaults": {n: v.default for n, v in VARIABLES.items() if v.default is not None},
-        "stemmingRatio": STEMMING_RATIO,
         "throw": _throw(network),
+        # What follows from other inputs is completed, as `predict` does.
+        "held": {n: v for n, v in held.items() if n in VARIABLES and n not in COMPLETED},
+        "rule": rules_as_data(),
         "variables": {
             name: {
                 "title": v.long_name.split(";")[0],

@@ -1,6 +1,7 @@
 /* Every number of the page with its prediction band. */
 import { network, predictRow } from "../model.js";
 import { completed, inputNames } from "./design.js";
+import { refusals, valuesAtBurden } from "./rule.js";
 
 const gravity = 9.81;
 const outputTitles = {
@@ -60,16 +61,37 @@ export function resultsOf(design) {
   return { rows, full, domain: answer.domain, offending: inputNames.filter((_, i) => answer.offending[i]), score: answer.score };
 }
 
+/* Values of a column from its lower to its upper end, evenly as its slider moves. */
+function rangeSteps({ lower, upper, log }, steps) {
+  return Array.from({ length: steps + 1 }, (_, k) => {
+    const share = k / steps;
+    return k === 0 ? lower : k === steps ? upper : log ? lower * (upper / lower) ** share : lower + share * (upper - lower);
+  });
+}
+
+/**
+ * Where one input may go on its slider, the others as they are, spacing and stemming with the burden:
+ * the verdict at every step (also "impossible"), and the ends of what is not outside.
+ */
+export function validRange(design, column, ratios, steps = 40) {
+  const { name } = column;
+  const points = rangeSteps(column, steps).map((x) => {
+    const values = name === "burden" ? valuesAtBurden(design, x, ratios) : { ...design.values, [name]: x };
+    const moved = { explosive: design.explosive, values };
+    return { x, domain: refusals(moved, "si").length ? "impossible" : predicted(moved).domain };
+  });
+  const valid = points.filter(({ domain }) => domain === "inside" || domain === "unusual");
+  return { domains: points.map(({ domain }) => domain), lower: valid.at(0)?.x, upper: valid.at(-1)?.x };
+}
+
 /** Least and greatest velocity while one input goes over its trained range; the others stay. */
 export function sensitivityOf(design, output = "burden_velocity", steps = 40) {
   const j = network.outputs.findIndex(({ name }) => name === output);
   if (j < 0) return [];
   return network.inputs.map((column) => {
-    const { name, lower, upper, log } = column;
+    const { name } = column;
     const points = [];
-    for (let k = 0; k <= steps; k += 1) {
-      const share = k / steps;
-      const x = k === 0 ? lower : k === steps ? upper : log ? lower * (upper / lower) ** share : lower + share * (upper - lower);
+    for (const x of rangeSteps(column, steps)) {
       const answer = predicted({ explosive: design.explosive, values: { ...design.values, [name]: x } });
       points.push({ x, value: answer.values[j], domain: answer.domain });
     }

@@ -2,6 +2,7 @@
 import { network, predictRow } from "../model.js";
 import { completed, inputNames } from "./design.js";
 import { throwOf } from "./answers.js";
+import { refusals } from "./rule.js";
 
 /** Records of a CSV text; quotes, and comma or semicolon. */
 export function parseCsv(text) {
@@ -66,6 +67,9 @@ export function answerBatch(text) {
     if (position < 0) faults.push(`line ${i + 2}: explosive "${given.explosive ?? ""}" is not one of ${network.explosives.join(", ")}`);
     if (wrong.length) faults.push(`line ${i + 2}: no number of at least 0 in ${wrong.join(", ")}`);
     if (position < 0 || wrong.length) return;
+    const impossible = refusals({ values: Object.fromEntries(inputNames.map((name) => [name, given[name]])) }, "metric");
+    faults.push(...impossible.map((reason) => `line ${i + 2}: ${reason}`));
+    if (impossible.length) return;
     const row = inputNames.map((name) => given[name]);
     const answer = predictRow(position, row);
     const height = completed({ values: given }).bench_height;

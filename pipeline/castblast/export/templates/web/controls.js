@@ -17,6 +17,11 @@ function fromSlider({ lower, upper, log }, step) {
   return Math.min(upper, Math.max(lower, Number(x.toPrecision(4))));
 }
 
+function rangeWords({ name, lower, upper }, system) {
+  const { unit, factor } = unitOf(name, system);
+  return `${digits(lower * factor, 3)} to ${digits(upper * factor, 3)}${unit ? ` ${unit}` : ""}`;
+}
+
 /** Tabs of the explosives; `choose` gets the name. Arrow keys move as in any tab list. */
 export function buildTabs(choose) {
   const list = document.getElementById("explosives");
@@ -45,10 +50,10 @@ export function buildControls(system, change) {
 }
 
 function control(column, system, change) {
-  const { name, lower, upper } = column;
+  const { name } = column;
   const { unit, factor } = unitOf(name, system);
   const title = titleOf(name);
-  const range = `${digits(lower * factor, 3)} to ${digits(upper * factor, 3)}${unit ? ` ${unit}` : ""}`;
+  const range = rangeWords(column, system);
   const field = htmlNode("input", {
     type: "text", inputmode: "decimal", autocomplete: "off", id: `field-${name}`, "aria-describedby": `hint-${name}`,
   });
@@ -64,6 +69,7 @@ function control(column, system, change) {
     htmlNode("label", { for: `field-${name}` }, title),
     htmlNode("span", { class: "entry" }, field, htmlNode("span", { class: "unit" }, unit)),
     slider,
+    htmlNode("div", { class: "valid", id: `valid-${name}`, "aria-hidden": "true" }),
     htmlNode("p", { class: "hint", id: `hint-${name}` }, `Trained on ${range}`),
   );
 }
@@ -83,7 +89,22 @@ export function showValue(name, value, system, typing) {
   const box = document.getElementById(`control-${name}`);
   box.classList.toggle("bad", bad);
   box.classList.toggle("outside", outside);
-  const range = `${digits(column.lower * factor, 3)} to ${digits(column.upper * factor, 3)}${unit ? ` ${unit}` : ""}`;
+  const range = rangeWords(column, system);
   const why = bad ? `Not a usable number. Give ${range}` : outside ? `Outside: trained on ${range}` : `Trained on ${range}`;
   document.getElementById(`hint-${name}`).textContent = why;
+}
+
+/** Shade the part of a slider where the design stays valid, and say its ends; null: nothing to say. */
+export function showRange(name, range, system) {
+  const colours = { inside: "var(--valid)", unusual: "var(--rare)", outside: "transparent", impossible: "transparent" };
+  const strip = document.getElementById(`valid-${name}`);
+  const domains = range?.domains ?? [];
+  const share = (k) => `${((100 * Math.min(Math.max(k, 0), domains.length - 1)) / (domains.length - 1)).toFixed(2)}%`;
+  const stops = domains.map((domain, k) => `${colours[domain]} ${share(k - 0.5)} ${share(k + 0.5)}`);
+  strip.style.background = stops.length ? `linear-gradient(to right, ${stops.join(", ")})` : "none";
+  const hint = document.getElementById(`hint-${name}`);
+  const [trained] = hint.textContent.split("; valid");
+  if (!domains.length || trained.startsWith("Not")) return;
+  const here = range.lower === undefined ? "nowhere with these other inputs" : `here ${rangeWords({ name, ...range }, system)}`;
+  hint.textContent = `${trained}; valid ${here}`;
 }

@@ -1,5 +1,6 @@
 /* A design: explosive and inputs in SI; its completion, and its form in the link. */
 import { network } from "../model.js";
+import { completedInputs } from "./rule.js";
 
 export const inputNames = network.inputs.map(({ name }) => name);
 const groupTitles = { rock: "Rock", hole: "Hole and charge", bench: "Bench", other: "Other" };
@@ -23,16 +24,9 @@ export function firstDesign() {
   return { explosive: network.explosives[0], values };
 }
 
-/** All inputs of a design: given, else held in training, else as castblast completes them. */
+/** All inputs of a design, and the mean burden in front of the hole. */
 export function completed({ values }) {
-  const full = { ...facts.defaults, ...facts.held, ...values };
-  full.charge_diameter ??= full.hole_diameter;
-  full.spacing ??= full.burden;
-  if (values.charge_length !== undefined) full.stemming_length = full.bench_height - full.charge_length;
-  else {
-    full.stemming_length ??= facts.stemmingRatio * full.burden;
-    full.charge_length = full.bench_height - full.stemming_length;
-  }
+  const full = completedInputs(values);
   full.mean_burden = full.burden + 0.5 * full.bench_height / Math.tan(full.face_angle);
   return full;
 }

@@ -1,17 +1,18 @@
 /* The page: one state, drawn whenever it changes. */
 import { network, selfTest } from "../model.js";
 import { answerBatch, batchTemplate, csvText } from "./batch.js";
-import { buildControls, buildTabs, showValue } from "./controls.js";
+import { buildControls, buildTabs, showRange, showValue } from "./controls.js";
 import { domainWords } from "./domain.js";
-import { resultsOf, sensitivityOf } from "./answers.js";
+import { resultsOf, sensitivityOf, validRange } from "./answers.js";
 import { firstDesign, fromHash, inputNames, toHash } from "./design.js";
 import { htmlNode } from "./drawing.js";
+import { ratiosOf, refusals, valuesAtBurden } from "./rule.js";
 import { benchFigure, energyFigure, holeFigure, place, pressureFigure, tornadoFigure } from "./figures.js";
 
 const at = (id) => document.getElementById(id);
 const noHistories = "The pressure histories of the dataset did not come with this page.";
 const state = { design: firstDesign(), kept: null, system: "metric" };
-let pending = 0;
+let pending = 0, resting = 0;
 
 const usable = (design) => inputNames.every((name) => Number.isFinite(design.values[name]));
 const copyOf = ({ explosive, values }) => ({ explosive, values: { ...values } });
@@ -67,16 +68,33 @@ function showFigures(result) {
   place("tornado-figure", speed ? tornadoFigure(sensitivityOf(design), speed, system) : null, "No part of any range lies inside the training domain here.");
 }
 
-function showNothing() {
-  const names = inputNames.filter((name) => !Number.isFinite(state.design.values[name])).map(titleOf);
+function showNothing(lead, reasons) {
   const badge = at("domain");
   badge.dataset.domain = at("glance").dataset.domain = "invalid";
-  at("glance").textContent = "No answer: see the marked input";
-  badge.replaceChildren(htmlNode("strong", {}, "No answer"), htmlNode("span", {}, ` Not a usable number: ${names.join(", ")}.`));
+  at("glance").textContent = "No answer: see the reasons above";
+  badge.replaceChildren(htmlNode("strong", {}, "No answer"), htmlNode("span", {}, ` ${lead}`), htmlNode("ul", {}, ...reasons.map((reason) => htmlNode("li", {}, reason))));
   at("results-panel").dataset.domain = "invalid";
-  at("results").replaceChildren();
-  at("hole-legend").replaceChildren();
-  for (const id of ["pressure-figure", "energy-figure", "bench-figure", "hole-figure", "tornado-figure"]) place(id, null, "No answer: an input is not a usable number.");
+  for (const id of ["results", "hole-legend", "derived"]) at(id).replaceChildren();
+  for (const id of ["pressure-figure", "energy-figure", "bench-figure", "hole-figure", "tornado-figure"]) place(id, null, `No answer: ${lead.toLowerCase()}`);
+}
+
+/* Why a design has no answer: an input that is no number, or no bench that can hold it. */
+function withoutAnswer(design) {
+  const names = inputNames.filter((name) => !Number.isFinite(design.values[name])).map(titleOf);
+  if (names.length) return { lead: "An input is not a usable number.", reasons: names };
+  const reasons = refusals(design, state.system);
+  return reasons.length ? { lead: "No bench can hold this design.", reasons } : null;
+}
+
+/* Some hundred answers: when the hand rests, so that a slider stays smooth. */
+function laterRanges() {
+  clearTimeout(resting);
+  resting = setTimeout(showRanges, 80);
+}
+
+function showRanges() {
+  const ready = usable(state.design);
+  for (const column of network.inputs) showRange(column.name, ready ? validRange(state.design, column, state.ratios) : null, state.system);
 }
 
 function showSummary(full) {
@@ -93,8 +111,10 @@ function draw() {
     if (chosen) at("results-panel").setAttribute("aria-labelledby", tab.id);
   }
   at("forget").hidden = !state.kept;
-  at("keep").disabled = !usable(state.design);
-  if (!usable(state.design)) return showNothing();
+  const nothing = withoutAnswer(state.design);
+  at("keep").disabled = nothing !== null;
+  laterRanges();
+  if (nothing) return showNothing(nothing.lead, nothing.reasons);
   const result = resultsOf(state.design);
   showResults(result, state.kept ? resultsOf(state.kept) : null);
   showDomain(result);
@@ -105,10 +125,19 @@ function draw() {
   return result;
 }
 
+/* The burden slider takes spacing and stemming along; a field changes its own input alone. */
 function change(name, value, source) {
-  state.design.values[name] = value;
-  showValue(name, value, state.system, source === "field");
+  const { design } = state;
+  const sliding = name === "burden" && source === "slider" && usable({ values: { ...design.values, burden: value } });
+  if (sliding) design.values = valuesAtBurden(design, value, state.ratios);
+  else design.values[name] = value;
+  if (!sliding) keepRatios();
+  for (const other of inputNames) showValue(other, design.values[other], state.system, other === name && source === "field");
   draw();
+}
+
+function keepRatios() {
+  if (usable(state.design)) state.ratios = ratiosOf(state.design);
 }
 
 function rebuild() {
@@ -122,7 +151,9 @@ function restore(hash) {
   const { design, kept, system } = fromHash(hash);
   if (hash.length > 1 && !design) at("notice").textContent = "The link holds no complete design for this model; the usual design is shown.";
   state.design = design ?? state.design;
-  state.kept = kept;
+  state.kept = kept && withoutAnswer(kept) === null ? kept : null;
+  if (kept && !state.kept) at("notice").textContent = "No bench can hold the kept design of the link; it was dropped.";
+  keepRatios();
   state.system = system ?? state.system;
   rebuild();
 }
@@ -169,4 +200,4 @@ const deviation = selfTest();
 at("self-test").textContent = deviation < 1e-12 ? `Self-test passed: golden rows reproduced to ${deviation.toExponential(1)}.` : `Self-test FAILED (${deviation.toExponential(1)}): do not use this page in this browser.`;
 at("self-test").classList.toggle("failed", !(deviation < 1e-12));
 /** For scripts and tests. */
-window.castblast = { state, resultsOf, sensitivityOf, answerBatch, runBatch, batchTemplate, network };
+window.castblast = { state, resultsOf, sensitivityOf, refusals, answerBatch, runBatch, batchTemplate, network };
