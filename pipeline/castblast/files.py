@@ -6,11 +6,12 @@ place together (`staged`).
 
 from __future__ import annotations
 
+import csv
 import errno
 import io
 import os
 import shutil
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from uuid import uuid4
@@ -19,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from castblast.errors import CastblastError, OutputError
+from castblast.names import cell_text
 from castblast.stopping import deferred_stop
 
 #: A disk, a quota or the allowed size of a file is full.
@@ -157,9 +159,21 @@ def write_text(path: Path, text: str) -> Path:
     return write_with(path, lambda name: name.write_bytes(text.encode()))
 
 
-def write_csv(path: Path, columns: Mapping[str, ArrayLike]) -> Path:
-    """Write equally long columns under their headings, with full float precision."""
+def write_csv(path: Path, columns: Mapping[str, ArrayLike | Sequence[str]]) -> Path:
+    """Write equally long columns under their headings, with full float precision.
+
+    A column of texts is written as it is; none of its cells becomes a formula of a spreadsheet.
+    """
     buffer = io.StringIO()
-    table = np.column_stack([np.asarray(column, dtype=np.float64) for column in columns.values()])
-    np.savetxt(buffer, table, delimiter=",", header=",".join(columns), comments="", fmt="%.17g")
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*map(_cells, columns.values()), strict=True))
     return write_text(path, buffer.getvalue())
+
+
+def _cells(column: ArrayLike | Sequence[str]) -> list[str]:
+    """Cells of a column as text."""
+    values = np.asarray(column)
+    if values.dtype.kind == "U":
+        return list(map(cell_text, values.tolist()))
+    return [f"{value:.17g}" for value in values.astype(np.float64).tolist()]

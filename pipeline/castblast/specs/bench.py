@@ -22,6 +22,7 @@ from castblast.muckpile.packing import check_packing
 from castblast.resources import find_spec
 from castblast.specs.balls import BallsSpec
 from castblast.specs.firing import Direction, FiringPlan
+from castblast.specs.frame import FrameSpec
 from castblast.specs.ground import GroundSpec, one_or_many
 from castblast.specs.loading import Name, Spec, load_spec
 from castblast.specs.quantity import QuantityError, QuantityIn, convert, convert_variable
@@ -232,6 +233,9 @@ class BenchSpec(Spec):
     name : str
     bench : BenchGeometry
     firing : FiringPlan
+    frame : FrameSpec, optional
+        Where the bench lies in the grid of the mine. The files of holes and of ore are in that grid
+        then; everything else, and all results, stay in the frame of the bench.
     velocity : float [m s-1], optional
         Initial velocity of every block, or of those holes of a file that have none of their own.
     surrogate : mapping, optional
@@ -254,6 +258,7 @@ class BenchSpec(Spec):
     name: Name
     bench: BenchGeometry
     firing: FiringPlan = FiringPlan()
+    frame: FrameSpec | None = None
     velocity: Annotated[float, QuantityIn("m s-1", 0.0, 100.0)] | None = None
     surrogate: Annotated[dict[str, Any], BeforeValidator(_read_design)] | None = None
     direction: Direction = Direction()

@@ -6,7 +6,7 @@ import math
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from castblast.muckpile.bench import Bench, block_shape
 from castblast.muckpile.particles import FloatArray
@@ -25,9 +25,20 @@ _KNOWN = {
     "echelon": ("delay", "row_delay", "first"),
     "row": ("delay", "hole_delay"),
     "v": ("delay", "row_delay", "apex"),
-    "holes": ("holes", "blocks"),
+    "holes": ("holes", "blocks", "columns"),
     "none": (),
 }
+
+
+def _read_columns(value: object) -> object:
+    """Let a number of a column stand without quotation marks."""
+    if not isinstance(value, dict):
+        message = "a group of keys is needed, such as {x: 'Collar X [m]', delay: '4 [ms]'}"
+        raise QuantityError(message)
+    return {
+        name: str(head) if isinstance(head, int) and not isinstance(head, bool) else head
+        for name, head in value.items()
+    }
 
 
 class Scatter(Spec):
@@ -55,6 +66,9 @@ class FiringPlan(Spec):
         Place along the bench where a V opens; default: the middle.
     holes : str, optional
         CSV of holes, relative to the bench file; makes the pattern ``holes``.
+    columns : mapping of str to str or int
+        Which columns of the file are meant where its heads are other ones or missing: a head or a
+        number from 1, with its unit in brackets where the file gives none.
     blocks : {"grid", "nearest_hole"}
         Each hole of the file fires a block of burden by spacing, or the rock nearest to it.
     start : float [s]
@@ -70,6 +84,7 @@ class FiringPlan(Spec):
     first: Literal["near_end", "far_end"] = "near_end"
     apex: Annotated[float, QuantityIn("m", 0.0, 2000.0)] | None = None
     holes: Annotated[str, Field(min_length=1)] | None = None
+    columns: Annotated[dict[str, str], BeforeValidator(_read_columns)] = Field(default_factory=dict)
     blocks: Literal["grid", "nearest_hole"] = "grid"
     start: _Delay = 0.0
     scatter: Scatter | None = None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,18 +14,23 @@ from castblast.muckpile.bench import Bench, assign_blocks, bench_outline, block_
 from castblast.muckpile.outline import depth_inside
 from castblast.muckpile.particles import FloatArray, IntArray
 from castblast.specs.firing import THROW_AZIMUTH, THROW_ELEVATION
+from castblast.specs.frame import FrameSpec, suggest_frame
 from castblast.specs.quantity import QuantityIn, VariableIn
 from castblast.specs.table import ID_HEADS, Form, Table, read_table
+from castblast.specs.tie_up import firing_times
 from castblast.variables import INPUT_NAMES
 
 _FROM_BENCH = ("bench_height", "face_angle")
 #: Two holes closer than this share of burden and spacing are one, where balls go to the nearest.
 _TOO_CLOSE = 0.25
+#: So many holes outside the bench are slips; more of them, and most, stand in another frame.
+_A_FEW = 3
 _FORM = Form(
     columns={
         "x": "m",
         "y": "m",
         "delay": QuantityIn("s", 0.0, 60.0),
+        "connector_delay": QuantityIn("s", 0.0, 10.0),
         "velocity": QuantityIn("m s-1", 0.0, 100.0),
         "direction": THROW_AZIMUTH,
         "elevation": THROW_ELEVATION,
@@ -31,8 +38,10 @@ _FORM = Form(
         **{name: VariableIn(name) for name in INPUT_NAMES if name not in _FROM_BENCH},
     },
     required=("x", "y", "delay"),
-    texts=("explosive",),
+    texts=("explosive", "from_hole"),
     aliases={
+        "easting": "x",
+        "northing": "y",
         "firing_time": "delay",
         "diameter": "hole_diameter",
         "explosive_mass": "charge_mass",
@@ -41,6 +50,13 @@ _FORM = Form(
     },
     ids=ID_HEADS,
     unique_ids=True,
+    instead={"delay": ("from_hole", "connector_delay")},
+    hint="; or say in the bench file which columns they are, by head or number: "
+    "'firing: {columns: {x: Collar X [m], y: 5 [m], ...}}'",
+)
+_STRING_FILE = (
+    "is a string file (.str), without heads and delays; a CSV with x [m], y [m], delay [ms] is "
+    "needed"
 )
 
 
@@ -74,13 +90,21 @@ class Holes(NamedTuple):
     label: list[str]
 
 
-def read_holes(path: Path, bench: Bench, *, by_block: bool) -> Holes:
+def read_holes(
+    path: Path,
+    bench: Bench,
+    *,
+    by_block: bool,
+    frame: FrameSpec | None = None,
+    columns: Mapping[str, str] | None = None,
+) -> Holes:
     """Read and check a file of holes.
 
     Parameters
     ----------
     path : Path
-        CSV with ``x [m], y [m], delay [ms]``, optionally ``velocity [m/s]``, ``direction [deg]``,
+        CSV with ``x [m], y [m], delay [ms]`` (or ``from_hole`` and ``connector_delay [ms]``, which
+        are summed along the tie-up), optionally ids,  ``velocity [m/s]``, ``direction [deg]``,
         ``elevation [deg]``, ``explosive``, ``charge_mass [kg]`` and any input variable.
     bench : Bench
         Holes must stand inside it.
@@ -93,9 +117,16 @@ def read_holes(path: Path, bench: Bench, *, by_block: bool) -> Holes:
     SpecError
         One line per fault, with file and line.
     """
-    table = read_table(path, _FORM)
+    if path.suffix.lower() == ".str":
+        raise SpecError(f"{path}: {_STRING_FILE}")
+    table = read_table(path, replace(_FORM, chosen=columns or {}))
+    delay = table.number.get("delay")
+    if delay is None:
+        delay = firing_times(table, "from_hole", "connector_delay")
     place = np.column_stack([table.number["x"], table.number["y"]])
-    faults = _place_faults(table, place, bench)
+    if frame is not None:
+        place = frame.to_bench(place)
+    faults = _place_faults(table, place, delay, bench, frame)
     faults += _shared_blocks(table, place, bench) if by_block else _close(table, place, bench)
     if faults:
         raise SpecError("\n".join(faults))
@@ -103,7 +134,7 @@ def read_holes(path: Path, bench: Bench, *, by_block: bool) -> Holes:
     nothing = np.full(len(place), np.nan)
     return Holes(
         place,
-        number["delay"],
+        delay,
         number.get("velocity", nothing),
         number.get("direction", nothing),
         number.get("elevation", nothing),
@@ -133,14 +164,33 @@ def _level(place: FloatArray) -> FloatArray:
     return np.column_stack([place, np.zeros(len(place))])
 
 
-def _place_faults(table: Table, place: FloatArray, bench: Bench) -> list[str]:
+def _place_faults(
+    table: Table, place: FloatArray, delay: FloatArray, bench: Bench, frame: FrameSpec | None
+) -> list[str]:
+    """Say which holes stand outside the bench; where most do, what would bring them onto it."""
     outside = depth_inside(bench_outline(bench), _level(place)) < -1e-9
-    return [
-        f"{table.where(k)}: the hole at x = {place[k, 0]:g} m, y = "
-        f"{place[k, 1]:g} m stands outside the bench, {-bench.width:g} to 0 m in x and 0 to "
-        f"{bench.length:g} m in y"
-        for k in np.flatnonzero(outside).tolist()
-    ]
+    room = f"the bench, {-bench.width:g} to 0 m in x and 0 to {bench.length:g} m in y"
+    if outside.sum() <= max(_A_FEW, 0.5 * len(place)):
+        return [
+            f"{table.where(k)}: the hole at x = {place[k, 0]:g} m, y = {place[k, 1]:g} m stands "
+            f"outside {room}"
+            for k in np.flatnonzero(outside).tolist()
+        ]
+    size = np.ptp(place, axis=0)
+    count = "all" if outside.all() else f"{outside.sum()} of {len(place)}"
+    found = (
+        f"{table.path}: {count} holes stand outside {room}: x is {place[:, 0].min():.10g} to "
+        f"{place[:, 0].max():.10g} m, y {place[:, 1].min():.10g} to {place[:, 1].max():.10g} m"
+    )
+    grid = np.column_stack([table.number["x"], table.number["y"]])
+    suggested = suggest_frame(grid, delay, bench)
+    if suggested is None:
+        return [
+            f"{found}; {size[0]:.4g} x {size[1]:.4g} m are more than the bench holds: check the "
+            f"units of x and y, and the size of the bench"
+        ]
+    lead = "places in a mine grid need" if frame is None else "the frame of the bench file may be"
+    return [f"{found}; {lead} '{suggested.words()}'"]
 
 
 def _shared_blocks(table: Table, place: FloatArray, bench: Bench) -> list[str]:

@@ -17,6 +17,8 @@ from pydantic import Field
 from castblast.errors import SpecError
 from castblast.muckpile.bench import Bench
 from castblast.muckpile.ore import OrePolygon
+from castblast.muckpile.particles import FloatArray
+from castblast.specs.frame import FrameSpec
 from castblast.specs.loading import Label, Spec, load_spec, make_spec
 from castblast.specs.quantity import QuantityIn
 from castblast.specs.table import Form, read_table
@@ -26,6 +28,7 @@ _FORM = Form(
     columns={"x": "m", "y": "m", "grade": QuantityIn("1", lower=0.0)},
     required=("name", "x", "y"),
     texts=("name",),
+    aliases={"easting": "x", "northing": "y"},
     bare=True,
 )
 # Polygons drawn side by side share corners that were rounded to a centimetre.
@@ -49,7 +52,9 @@ class OreSpec(Spec):
     notes: str = ""
 
 
-def read_ore(path: Path, bench: Bench | None = None) -> tuple[OrePolygon, ...]:
+def read_ore(
+    path: Path, bench: Bench | None = None, frame: FrameSpec | None = None
+) -> tuple[OrePolygon, ...]:
     """Read ore polygons from YAML, or from CSV by its suffix.
 
     YAML holds ``polygons``, a list of ``name``, ``corners`` ([x, y] pairs) and optionally
@@ -61,6 +66,8 @@ def read_ore(path: Path, bench: Bench | None = None) -> tuple[OrePolygon, ...]:
     path : path
     bench : Bench, optional
         Polygons that lie wholly beside it are faults.
+    frame : FrameSpec, optional
+        Of the bench in the grid in which the corners are eastings and northings.
 
     Raises
     ------
@@ -75,7 +82,7 @@ def read_ore(path: Path, bench: Bench | None = None) -> tuple[OrePolygon, ...]:
     polygons = tuple(
         OrePolygon(
             polygon.name,
-            _without_closing_corner(np.array(polygon.corners, dtype=np.float64)),
+            _without_closing_corner(_corners(polygon, frame)),
             math.nan if polygon.grade is None else polygon.grade,
         )
         for polygon in spec.polygons
@@ -83,6 +90,12 @@ def read_ore(path: Path, bench: Bench | None = None) -> tuple[OrePolygon, ...]:
     if faults := _shape_faults(polygons, bench):
         raise SpecError("\n".join(f"{path}: {fault}" for fault in faults))
     return polygons
+
+
+def _corners(polygon: OrePolygonSpec, frame: FrameSpec | None) -> FloatArray:
+    """Corners (k, 2) [m] in the frame of the bench."""
+    corners = np.array(polygon.corners, dtype=np.float64)
+    return corners if frame is None else frame.to_bench(corners)
 
 
 def _without_closing_corner(corners: Any) -> Any:

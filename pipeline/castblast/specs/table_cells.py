@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from castblast.names import shortened
 from castblast.specs.quantity import QuantityError, convert
 from castblast.specs.table_text import NUMBER
 
@@ -130,8 +131,7 @@ def is_number(cell: str) -> bool:
 
 def shown(cell: str) -> str:
     """Cell for a message, cut where it is long."""
-    cell = cell.replace("\n", " ")
-    return (cell if len(cell) <= _LONGEST_CELL else cell[: _LONGEST_CELL - 3] + "...") or "empty"
+    return shortened(cell, _LONGEST_CELL) or "empty"
 
 
 def _why(cell: str) -> str:

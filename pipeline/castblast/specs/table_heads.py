@@ -43,6 +43,8 @@ class Form:
     chosen : mapping of str to str
         Name of a column to the head that stands for it, or to its number from 1, with a unit in
         brackets where the file gives none. Other heads that are not known are left out then.
+    instead : mapping of str to sequence of str
+        Columns that together stand for a required one.
     hint : str
         What to do if no column is there.
     """
@@ -55,6 +57,7 @@ class Form:
     unique_ids: bool = False
     bare: bool = False
     chosen: Mapping[str, str] = field(default_factory=dict)
+    instead: Mapping[str, Sequence[str]] = field(default_factory=dict)
     hint: str = ""
 
     def names(self) -> tuple[str, ...]:
@@ -101,7 +104,11 @@ def read_heads(path: Path, sheet: Sheet, form: Form) -> tuple[list[Head], Rows]:
             heads[0].kind = "label"  # numbers of the rows, as pandas writes them
     faults = _head_faults(where, sheet, heads, form)
     found = {head.name for head in heads}
-    missing = [name for name in form.required if name not in found]
+    missing = [
+        name
+        for name in form.required
+        if name not in found and not (form.instead.get(name) and found >= {*form.instead[name]})
+    ]
     if missing and not found & set(form.required) and len(missing) > 1:
         # Another form altogether: one line says more than one for each head.
         given = ", ".join(f"'{shown(head)}'" for head in sheet.heads[:_KNOWN_SHOWN])

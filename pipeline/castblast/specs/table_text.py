@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from castblast.errors import SpecError
-from castblast.specs.loading import nearest_file
+from castblast.reading import read_bytes
 
 MOST_BYTES = 256 * 2**20
 LONGEST_LINE = 2**20
@@ -79,8 +79,11 @@ def open_sheet(path: Path) -> Sheet:
         One line: no file, no text, another kind of file, nothing in it, a line or a table beyond
         all bounds. The rows may raise it too, with their line.
     """
-    text = decode(path, read_bytes(path))
-    lines = _lines(text, path)
+    data = read_bytes(path, "table", MOST_BYTES)
+    for mark, words in _FOREIGN:
+        if data.startswith(mark):
+            raise SpecError(f"{path}: {words}")
+    lines = _lines(decode(path, data), path)
     remarks: list[tuple[int, str]] = []
     separator, at = "", -1
     for at, line in enumerate(lines):
@@ -111,33 +114,6 @@ def _sheet(
     if len(heads) > MOST_COLUMNS:
         raise SpecError(f"{path}: line {line}: {len(heads):,} columns; at most {MOST_COLUMNS:,}")
     return Sheet(line, heads, rows, separator)
-
-
-def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
-    """Read a file that a person named, up to `most` bytes.
-
-    Raises
-    ------
-    SpecError
-        One line: missing, a folder, unreadable, too large, or a kind of file that is no text.
-    """
-    try:
-        with path.open("rb") as file:
-            data = file.read(most + 1)
-    except FileNotFoundError:
-        raise SpecError(f"{path}: no such file{nearest_file(path)}") from None
-    except IsADirectoryError:
-        raise SpecError(f"{path}: is a folder; a table is needed") from None
-    except OSError as fault:
-        raise SpecError(f"{path}: cannot be read: {fault.strerror}") from None
-    except ValueError:  # a name with a NUL byte
-        raise SpecError(f"{str(path)!r}: is not the name of a file") from None
-    if len(data) > most:
-        raise SpecError(f"{path}: is larger than {most / 2**20:.0f} MiB; split it")
-    for mark, words in _FOREIGN:
-        if data.startswith(mark):
-            raise SpecError(f"{path}: {words}")
-    return data
 
 
 def decode(path: Path, data: bytes) -> str:

@@ -106,7 +106,8 @@ def run_muckpile(
     if seed is not None:
         spec = spec.model_copy(update={"seed": seed})
     geometry = spec.bench.to_bench()
-    wanted = read_extras(extras, geometry, path.parent / spec.ore if spec.ore else None)
+    ore_of_bench = path.parent / spec.ore if spec.ore else None
+    wanted = read_extras(extras, geometry, ore_of_bench, spec.frame)
     walls = _walls(spec, geometry, path.parent)
     plan = make_plan(spec, geometry, path.parent, one_speed=velocity is not None)
     folder = Path("runs") / spec.name if out is None else out
@@ -140,7 +141,7 @@ def run_muckpile(
     outcome = describe_run(spec, plan.speed, plan.prediction, start, result, metrics, ore)
     more = {"fragments": _describe_sizes(sizes), **bench_content(spec, path.parent)}
     outcome = replace(outcome, document=outcome.document | more)
-    files = write_results(folder, spec, case, result, outcome.document, ore) + frames
+    files = write_results(folder, spec, case, result, outcome.document, ore, plan.label) + frames
     progress(1.0, f"{result.time:.1f} s simulated")
     return MuckpileOutcome(outcome.document, outcome.title, outcome.rows, files)
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 from castblast.errors import SpecError
 from castblast.muckpile.bench import Bench
 from castblast.muckpile.ore import DigPlan, OrePolygon
+from castblast.specs.frame import FrameSpec
 from castblast.specs.ore import read_ore
 from castblast.specs.quantity import parse_quantity
 from castblast.stages.muckpile_frames import FRAME_INTERVAL, check_frames
@@ -54,7 +55,9 @@ class ReadExtras(NamedTuple):
     interval: float
 
 
-def read_extras(extras: Extras, bench: Bench, ore_of_bench: Path | None) -> ReadExtras:
+def read_extras(
+    extras: Extras, bench: Bench, ore_of_bench: Path | None, frame: FrameSpec | None = None
+) -> ReadExtras:
     """Check the wishes before anything is simulated.
 
     Parameters
@@ -63,6 +66,8 @@ def read_extras(extras: Extras, bench: Bench, ore_of_bench: Path | None) -> Read
     bench : Bench
     ore_of_bench : path, optional
         File of ore that the bench file names.
+    frame : FrameSpec, optional
+        Of the bench in the grid of the mine, in which the ore is given then.
 
     Raises
     ------
@@ -77,7 +82,7 @@ def read_extras(extras: Extras, bench: Bench, ore_of_bench: Path | None) -> Read
     if extras.flitch is not None:
         plan = plan._replace(flitch=_positive(extras.flitch, "m", "--flitch"))
     interval = _positive(extras.frame_interval, "s", "--frame-interval")
-    return ReadExtras(() if path is None else read_ore(path, bench), plan, interval)
+    return ReadExtras(() if path is None else read_ore(path, bench, frame), plan, interval)
 
 
 def _positive(value: str | float, unit: str, where: str) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -39,6 +39,8 @@ class Plan(NamedTuple):
         What the surrogate said.
     holes : array (b, 2), optional [m]
         Only where balls belong to the nearest hole instead of a block of the grid.
+    label : sequence of str
+        Id of the hole that fires each block, b of them; empty where the holes have none.
     """
 
     delay: FloatArray
@@ -46,6 +48,7 @@ class Plan(NamedTuple):
     speed: float
     prediction: dict[str, Any] | None = None
     holes: FloatArray | None = None
+    label: Sequence[str] = ()
 
     def blocks_of(self, position: FloatArray, bench: Bench) -> IntArray:
         """Block (n,) of each ball by its place (n, 3) [m]."""
@@ -88,7 +91,13 @@ def make_plan(spec: BenchSpec, bench: Bench, folder: Path, *, one_speed: bool = 
         charges = _charges(spec, bench, block_centres(bench), delay, np.full(len(delay), speed))
         return _fire(spec, charges, np.arange(len(delay)), prediction)
     by_block = firing.blocks == "grid"
-    holes = read_holes(folder / firing.holes, bench, by_block=by_block)
+    holes = read_holes(
+        folder / firing.holes,
+        bench,
+        by_block=by_block,
+        frame=spec.frame,
+        columns=firing.columns,
+    )
     each, prediction = _hole_speeds(spec, holes, one_speed=one_speed)
     charges = _charges(spec, bench, holes.place, holes.delay + firing.start, each)
     charges = charges._replace(
@@ -96,9 +105,11 @@ def make_plan(spec: BenchSpec, bench: Bench, folder: Path, *, one_speed: bool = 
         elevation=np.where(np.isnan(holes.elevation), charges.elevation, holes.elevation),
     )
     if by_block:
-        return _fire(spec, charges, blocks_of_holes(holes, bench), prediction)
+        charge = blocks_of_holes(holes, bench)
+        label = [holes.label[k] if k >= 0 else "" for k in charge] if holes.label else ()
+        return _fire(spec, charges, charge, prediction)._replace(label=label)
     plan = _fire(spec, charges, np.arange(len(holes.delay)), prediction)
-    return plan._replace(holes=holes.place)
+    return plan._replace(holes=holes.place, label=holes.label)
 
 
 def _charges(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -163,10 +163,12 @@ def write_results(
     result: CastResult,
     document: Mapping[str, Any],
     ore: OreRun | None = None,
+    label: Sequence[str] = (),
 ) -> list[Path]:
     """Write final state, tables, metrics and pictures into `folder`.
 
-    The files depend on bench file and code only: the time on the clock is left out of them.
+    `label` is the id of the hole of each block, see `Plan`. The files depend on bench file and code
+    only: the time on the clock is left out of them.
     """
     bench, before, after = spec.bench.to_bench(), case.particles, result.particles
     surface = pile_surface(before, after, bench, case.walls)
@@ -188,7 +190,7 @@ def write_results(
         write_with(folder / "surface.npz", lambda name: np.savez(name, **surface._asdict())),
         write_csv(folder / "profile.csv", profile_columns(surface, sections, ground)),
         write_csv(folder / "history.csv", history_columns(result.history)),
-        write_csv(folder / "blocks.csv", block_columns(case, after, bench)),
+        write_csv(folder / "blocks.csv", block_columns(case, after, bench, label)),
         write_text(folder / "metrics.json", json.dumps(finite(timeless), indent=2) + "\n"),
     ]
     return files + _draw(folder, spec, case, result, ore)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -88,14 +89,20 @@ def history_columns(history: CastHistory) -> dict[str, Any]:
     }
 
 
-def block_columns(case: CastCase, after: Particles, bench: Bench) -> dict[str, Any]:
-    """Columns of a row per block that holds balls: plan, place before, movement and its spread."""
+def block_columns(
+    case: CastCase, after: Particles, bench: Bench, label: Sequence[str] = ()
+) -> dict[str, Any]:
+    """Columns of a row per block that holds balls: plan, place before, movement and its spread.
+
+    `label` is the id of the hole that fires each block, if the holes have any.
+    """
     _, columns = block_shape(bench)
     moved = group_movement(case.particles, after, case.particles.block, len(case.block_delay))
     block = np.flatnonzero(moved.balls)
     cell = assign_blocks(moved.start[block], bench)
     table: dict[str, Any] = {
         "block": block,
+        **({"hole": [label[k] for k in block.tolist()]} if label else {}),
         "row": cell // columns,
         "column": cell % columns,
         "delay [s]": case.block_delay[block],

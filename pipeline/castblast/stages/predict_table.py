@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from castblast.design import FaultyRows
 from castblast.errors import SpecError
+from castblast.names import cell_text
 from castblast.network import Floats, Network, offending_inputs
 from castblast.specs.quantity import VariableIn
 from castblast.specs.table import ID_HEADS, Form, Table, read_table
@@ -33,7 +34,6 @@ _FORM = Form(
 )
 _MOST_FAULTS = 20
 _CHUNK = 4096
-_FORMULA = ("=", "+", "-", "@", "\t", "\r")
 _SPECIAL = re.compile(r'[,";\t\r\n]')
 
 
@@ -240,6 +240,6 @@ def _outside(found: PredictionTable) -> dict[int, str]:
 
 def _cell(text: str) -> str:
     """Text as a cell of a CSV file; a spreadsheet must not take it for a formula."""
-    if text.startswith(_FORMULA) and not NUMBER.fullmatch(text):
-        text = f"'{text}"
+    if not NUMBER.fullmatch(text):
+        text = cell_text(text)
     return '"' + text.replace('"', '""') + '"' if _SPECIAL.search(text) else text
