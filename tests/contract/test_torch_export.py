@@ -18,6 +18,7 @@ from castblast.export.parity import TOLERANCE, check_wrapped_parity
 from castblast.network import in_domain, offending_inputs, predict_rows
 from castblast.specs.model import PAPER_FEATURES, PAPER_TARGETS, read_model_spec
 from castblast.stages.export import export
+from castblast.stages.fitting import FIT_FILE, write_json
 from castblast.surrogate import estimators
 from castblast.surrogate.features import Table, read_table
 from castblast.surrogate.fit_store import fit_key, save_kept
@@ -126,7 +127,8 @@ def make(table, tmp_path_factory) -> Make:
             )
             spec = read_model_spec(path)
             found = fit_spec(spec, table)
-            save_kept(folder / name / "fit.pickle", found, fit_key(spec, table), spec)
+            save_kept(folder / name, found, fit_key(spec, table), spec)
+            write_json(folder / name / FIT_FILE, found.to_document())
             made[factory + options] = found, folder / name
         return made[factory + options]
 
@@ -277,13 +279,14 @@ def test_a_core_of_other_columns_is_refused(make: Make) -> None:
 
 
 def test_a_fit_of_other_code_is_not_exported(make: Make, table: Table, tmp_path: Path) -> None:
-    """Changed code, or a damaged file: what it would answer is not what was scored."""
-    fit, folder = make("Residual")
+    """Changed code, or another machine: what it would answer is not what was scored."""
+    fit, _ = make("Residual")
     other = tmp_path / "other"
     key = fit_key(fit.spec, table) | {"factory": "another"}
-    save_kept(other / "fit.pickle", fit, key, fit.spec)
+    save_kept(other, fit, key, fit.spec)
+    write_json(other / FIT_FILE, fit.to_document())
     with pytest.raises(SpecError, match="was fitted with other factory than there is now"):
         export(other, targets=("onnx",))
-    (other / "fit.pickle").write_bytes((folder / "fit.pickle").read_bytes()[:100])
-    with pytest.raises(SpecError, match="holds no fit"):
-        export(other, targets=("onnx",))
+    elsewhere = other.rename(tmp_path / "elsewhere")
+    with pytest.raises(SpecError, match="elsewhere: its fit is not kept on this machine"):
+        export(elsewhere, targets=("onnx",))

@@ -33,3 +33,7 @@ Scheduler: TypeAlias = Annotated[
     str | None, typer.Option(help="Address of a running Dask scheduler.", show_default=False)
 ]
 Restart: TypeAlias = Annotated[bool, typer.Option("--restart", help="Discard earlier shards.")]
+AllowCode: TypeAlias = Annotated[
+    bool,
+    typer.Option("--allow-code", help="Run the Python code that specs of kind custom name."),
+]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from castblast.cli.options import OutFolder
+from castblast.cli.options import AllowCode, OutFolder
 from castblast.cli.screen import Screen
 from castblast.cli.verb import verb
 
@@ -46,6 +46,7 @@ def train(
     workers: _Workers = None,
     tracking: _Tracking = None,
     runs: _Runs = _RUNS,
+    allow_code: AllowCode = False,
 ) -> Mapping[str, Any]:
     """Fit models and score them on rows never trained on; fits that are there stay."""
     from castblast.stages.train import train as run
@@ -58,6 +59,7 @@ def train(
             workers=workers,
             tracking=_is_tracked(screen, tracking),
             runs=runs,
+            allow_code=allow_code,
             progress=progress,
         )
     return _show(screen, outcome)
@@ -83,6 +85,7 @@ def tune(
     seed: Annotated[int, typer.Option(min=0, help="Of the sampler.")] = 0,
     tracking: _Tracking = None,
     runs: _Runs = _RUNS,
+    allow_code: AllowCode = False,
 ) -> Mapping[str, Any]:
     """Search the settings that a spec declares; a study that was stopped goes on."""
     from castblast.stages.tune import tune as run
@@ -98,6 +101,7 @@ def tune(
             seed=seed,
             tracking=_is_tracked(screen, tracking),
             runs=runs,
+            allow_code=allow_code,
             progress=progress,
         )
     return _show(screen, outcome)
@@ -126,6 +130,7 @@ def compare(
     workers: _Workers = None,
     tracking: _Tracking = None,
     runs: _Runs = _RUNS,
+    allow_code: AllowCode = False,
 ) -> Mapping[str, Any]:
     """Rank models on rows never trained on, ask them for physics, choose one (exit code 4: none).
 
@@ -144,6 +149,7 @@ def compare(
             workers=workers,
             tracking=_is_tracked(screen, tracking),
             runs=runs,
+            allow_code=allow_code,
             progress=progress,
         )
     if outcome.document["chosen"] is None:

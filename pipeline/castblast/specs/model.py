@@ -6,6 +6,7 @@ of a candidate is the name of its file.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias, get_args
 
@@ -45,8 +46,10 @@ __all__ = [
     "RidgeSpec",
     "SurrogateSpec",
     "TorchSpec",
+    "make_model_spec",
     "read_model_spec",
     "read_model_specs",
+    "refuse_code",
 ]
 
 ModelSpec: TypeAlias = (
@@ -73,14 +76,57 @@ def read_model_spec(path: Path) -> ModelSpec:
         Unreadable file, unknown family, unknown or unusable settings; all faults at once.
     """
     path = find_spec(path, "model spec")
-    content: dict[str, Any] = read_yaml(path)
+    return make_model_spec({"name": path.stem, **read_yaml(path)}, str(path), path.parent)
+
+
+def make_model_spec(content: Any, where: str, folder: Path) -> ModelSpec:
+    """Turn what a file says of a candidate into its spec.
+
+    Parameters
+    ----------
+    content : mapping
+        Plain values, whatever file they come from.
+    where : str
+        Origin for messages.
+    folder : path
+        Where a user's own module is looked for unless the content says.
+
+    Raises
+    ------
+    SpecError
+        Unknown family, unknown or unusable settings; all faults at once.
+    """
+    if not isinstance(content, Mapping):
+        message = f"{where}: is no spec of a model"
+        raise SpecError(message)
     kind = content.get("kind")
-    if kind not in _KINDS:
+    if not isinstance(kind, str) or kind not in _KINDS:
         known = ", ".join(_KINDS)
         what = "is missing" if kind is None else f"{kind}: unknown{nearest_name(str(kind), _KINDS)}"
-        message = f"{path}: kind: {what} (known kinds: {known})"
+        message = f"{where}: kind: {what} (known kinds: {known})"
         raise SpecError(message)
-    return make_spec({"name": path.stem, **content}, _KINDS[kind], str(path), folder=path.parent)
+    return make_spec(content, _KINDS[kind], where, folder=folder)
+
+
+def refuse_code(specs: Iterable[ModelSpec], *, allowed: bool) -> None:
+    """Refuse specs that run code of their own, unless that was asked for.
+
+    A spec of kind ``custom`` calls any function that it names, so reading one from a stranger
+    would be running the stranger's program.
+
+    Raises
+    ------
+    SpecError
+        One line for each of them, with what it would run.
+    """
+    lines = [
+        f"{spec.name}: kind custom runs Python code, {spec.factory}, looked for in {spec.folder} "
+        "first; read it, then add --allow-code"
+        for spec in specs
+        if isinstance(spec, CustomSpec) and not allowed
+    ]
+    if lines:
+        raise SpecError("\n".join(lines))
 
 
 def read_model_specs(paths: list[Path]) -> list[ModelSpec]:

@@ -1,6 +1,6 @@
 """The whole comparison of models on one dataset: fits, gate, league, curves, shifts, indices.
 
-What takes long is kept (fits in their folders, the rest under ``parts``), so that a comparison
+What takes long is kept in the cache of the user (`castblast.surrogate.kept`), so that a comparison
 which was stopped goes on and a second one only writes. ``comparison.json`` and all pictures are a
 function of dataset, specs and code; times are in ``timings.json``.
 """
@@ -158,6 +158,7 @@ def compare(
     workers: int | None = 1,
     tracking: bool = False,
     runs: Path = RUNS_FOLDER,
+    allow_code: bool = False,
     progress: ProgressCallback = silent,
 ) -> TrainOutcome:
     """Fit what is not fitted yet, judge all models and choose one.
@@ -181,6 +182,8 @@ def compare(
         Fits and parts at a time; None: the cores there are. Changes no number.
     tracking : bool
         Keep a record in MLflow under `runs`; changes no result.
+    allow_code : bool
+        Run the Python code that specs of kind ``custom`` name.
     progress : callable
 
     Raises
@@ -192,8 +195,11 @@ def compare(
     DatasetError
         An unusable dataset.
     """
+    from castblast.specs.model import refuse_code
+
     started = time.perf_counter()
     dataset, wanted, fits = _sources(dataset, specs, fits, extent)
+    refuse_code(wanted, allowed=allow_code)
     require_training("castblast compare", (), tracking=tracking)
     remarks: list[str] = []
     wanted = without_missing(wanted, remarks)
@@ -271,8 +277,7 @@ def _judge(
     if domain:
         sizes = (extent.probe_points, extent.dense_points)
         parts.append(Part("probe", probe_part, (dataset, *sizes), {**about, "sizes": sizes}))
-    kept = folder / "parts"
-    done = run_parts(parts, kept, workers=workers, progress=part(progress, 0.0, 0.6))
+    done = run_parts(parts, folder, workers=workers, progress=part(progress, 0.0, 0.6))
     gates: dict[str, dict[str, Any]] = {}
     if domain:
         probe = done["probe"].value
@@ -288,7 +293,7 @@ def _judge(
     parts = _parts_of_chosen(chosen, table, known, about, extent)
     parts += _shift_parts(_shifted(chosen, fits, league), table, known, about, extent)
     parts = [one for one in parts if one.name not in done]
-    done |= run_parts(parts, kept, workers=workers, progress=part(progress, 0.6, 1.0))
+    done |= run_parts(parts, folder, workers=workers, progress=part(progress, 0.6, 1.0))
     return Comparison(
         fits=fits,
         table=table,

@@ -78,7 +78,7 @@ def run_parts(
 
     found: dict[str, Done] = {}
     for part in parts:
-        kept = load_kept(folder / f"{part.name}.pickle", part.key)
+        kept = load_kept(_place(folder, part), part.key)
         if isinstance(kept, Done):
             found[part.name] = kept
     missing = [part for part in parts if part.name not in found]
@@ -87,13 +87,18 @@ def run_parts(
             part.name,
             _timed,
             (part.function, part.arguments),
-            partial(_keep, save_kept, folder / f"{part.name}.pickle", part.key),
+            partial(_keep, save_kept, _place(folder, part), part.key),
         )
         for part in missing
     ]
     results = run_jobs(jobs, workers, progress)
     found |= {part.name: done for part, done in zip(missing, results, strict=True)}
     return found
+
+
+def _place(folder: Path, part: Part) -> Path:
+    """What a part is kept under: no name of a fit has a dot."""
+    return folder / f"{part.name}.part"
 
 
 def _keep(save: Callable[..., object], path: Path, key: dict[str, str], done: Done) -> None:

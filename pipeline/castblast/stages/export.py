@@ -21,7 +21,7 @@ from castblast.files import write_text, write_with
 from castblast.network import Network
 from castblast.progress import ProgressCallback, silent
 from castblast.resources import SHIPPED_NETWORKS, is_bare_name, resource
-from castblast.stages.fitting import FIT_STORE
+from castblast.stages.fitting import FIT_FILE
 
 if TYPE_CHECKING:
     from castblast.export.parity import ParityReport
@@ -60,8 +60,7 @@ def export(
     ----------
     fit : path
         Folder of `castblast compare` (its chosen fit is taken), of one fit, or a network.json.
-        A folder without a network.json but with a fit is opened only if it is your own: like any
-        pickle, a kept fit can run code.
+        A fit without a network.json is taken from the cache of this user on this machine.
     out : path, optional
         Folder for the files; default ``export`` beside the fit.
     targets : sequence of str
@@ -92,7 +91,7 @@ def export(
     source = _find_source(fit)
     folder = source.parent / "export" if out is None else out
     _require_writable(folder)
-    if source.name == FIT_STORE:
+    if source.name == FIT_FILE:
         contents, reports = _export_module(source, wanted, verify, progress)
     else:
         network = read_network(source)
@@ -184,10 +183,10 @@ def find_network(fit: Path) -> Path:
 
 
 def _find_source(fit: Path) -> Path:
-    """As `find_network`; the kept fit of a folder that has no network."""
-    kept = fit / FIT_STORE
+    """As `find_network`; the scores of a fit that has no network."""
+    alone = fit / FIT_FILE
     has_network = any((fit / name).is_file() for name in ("comparison.json", "network.json"))
-    return kept if kept.is_file() and not has_network else find_network(fit)
+    return alone if alone.is_file() and not has_network else find_network(fit)
 
 
 def _export_module(
@@ -199,10 +198,10 @@ def _export_module(
     from castblast.surrogate.estimators import bare_model, is_torch_model
     from castblast.surrogate.fit_store import open_fit
 
-    fit = open_fit(source)
+    fit = open_fit(source.parent)
     name, model = fit.spec.name, bare_model(fit.estimator)
     if fit.network is not None:
-        message = f"{source.parent}: its network.json is gone; remove {FIT_STORE} and train again"
+        message = f"{source.parent}: its network.json is gone; run castblast train again"
         raise SpecError(message)
     if not is_torch_model(model):
         message = (

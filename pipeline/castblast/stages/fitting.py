@@ -1,7 +1,8 @@
 """Fit several specs on one table, some at a time, and keep what is finished.
 
-Each fit has a folder of its own. All files in it but ``fit.pickle`` are a function of rows and
-spec: no times, no paths.
+Each fit has a folder of its own. All files in it are a function of rows and spec: no times, no
+paths. The fitted estimator itself is kept in the cache of the user, see
+`castblast.surrogate.fit_store`.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ if TYPE_CHECKING:
     from castblast.surrogate.features import Table
     from castblast.surrogate.training import Fit
 
-#: A finished fit as it is kept for this machine.
-FIT_STORE = "fit.pickle"
+#: Scores of a fit, and its spec.
+FIT_FILE = "fit.json"
 _DATASET = "dataset.txt"
 #: Extras without which nothing is fitted, scored and drawn.
 _ALWAYS = ("data", "simulate", "train", "plot")
@@ -117,11 +118,14 @@ def fit_all(
         Fits at a time, each in a process; None: the cores there are. Changes no number.
     progress : callable
     """
-    from castblast.surrogate.fit_store import fit_key, load_fit
+    from castblast.surrogate.fit_store import fit_key, load_fit, unpacked
 
     keys = [fit_key(spec, table) for spec in specs]
-    places = [folder / spec.name / FIT_STORE for spec in specs]
+    places = [folder / spec.name for spec in specs]
     fits = [load_fit(place, key) for place, key in zip(places, keys, strict=True)]
+    for place, kept in zip(places, fits, strict=True):
+        if kept is not None and not _is_written(place, kept):
+            _write_files(place, kept)
     missing = [number for number, fit in enumerate(fits) if fit is None]
     if min(len(missing), workers or available_cores()) <= 1:
         for done, number in enumerate(missing):
@@ -141,9 +145,15 @@ def fit_all(
             )
             for n in missing
         ]
-        run_jobs(jobs, workers, progress)
-        for number in missing:  # one that cannot be kept is made once more, here
-            fits[number] = load_fit(places[number], keys[number]) or _fit_and_keep(
+        results = run_jobs(jobs, workers, progress)
+        for number, content in zip(missing, results, strict=True):
+            fit = (
+                load_fit(places[number], keys[number])
+                if content is None
+                else unpacked(content, specs[number])
+            )
+            # One that cannot be packed is made once more, here.
+            fits[number] = fit or _fit_and_keep(
                 specs[number], table, places[number], keys[number], silent
             )
     progress(1.0, f"{len(specs)} fits, {len(specs) - len(missing)} of them kept from earlier")
@@ -158,21 +168,36 @@ def note_dataset(folder: Path, dataset: Path) -> None:
 def kept_fits(folder: Path) -> tuple[Path, list[ModelSpec]]:
     """Dataset and specs of a folder of fits.
 
+    A fit that is kept on this machine has its spec as it was given; one that came from elsewhere
+    has that of its JSON file, with all features named.
+
     Raises
     ------
     SpecError
-        There are none.
+        There are none, or a damaged one.
     """
     from castblast.surrogate.fit_store import kept_spec
 
     note = folder / _DATASET
-    specs = [kept_spec(place) for place in sorted(folder.glob(f"*/{FIT_STORE}"))]
-    found = [spec for spec in specs if spec is not None]
+    files = sorted(folder.glob(f"*/{FIT_FILE}"))
+    found = [kept_spec(path.parent) or _spec_of(path) for path in files]
     if not note.is_file() or not found:
         message = f"{folder}: holds no fits of castblast train; give the dataset instead"
         raise SpecError(message)
     dataset = os.path.normpath(folder / note.read_text(encoding="utf-8").strip())
     return Path(dataset), found
+
+
+def _spec_of(path: Path) -> ModelSpec:
+    """Spec in the document of a fit."""
+    from castblast.specs.model import make_model_spec
+
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))["spec"]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        message = f"{path}: holds no spec of a model; run castblast train again"
+        raise SpecError(message) from None
+    return make_model_spec(content, f"{path}: spec", path.parent)
 
 
 def _fit_and_keep(
@@ -182,14 +207,27 @@ def _fit_and_keep(
     from castblast.surrogate.training import fit_spec
 
     fit = fit_spec(spec, table, progress)
-    _write_files(place.parent, fit)
+    _write_files(place, fit)
     save_kept(place, fit, key, spec)
     return fit
 
 
-def _fit_elsewhere(spec: ModelSpec, table: Table, place: Path, key: dict[str, str]) -> None:
-    """Fit in a process of its own: the result goes through the file."""
-    _fit_and_keep(spec, table, place, key, silent)
+def _fit_elsewhere(spec: ModelSpec, table: Table, place: Path, key: dict[str, str]) -> bytes | None:
+    """Fit in a process of its own; None where the result waits in the store, else the result."""
+    from castblast.surrogate.fit_store import is_kept, packed
+
+    fit = _fit_and_keep(spec, table, place, key, silent)
+    return None if is_kept(place) else packed(fit) or b""
+
+
+def _is_written(folder: Path, fit: Fit) -> bool:
+    """Whether the files of a fit lie in its folder."""
+    names = {"test_rows.csv", "parity.png", *(["network.json"] if fit.network is not None else [])}
+    try:
+        written = (folder / FIT_FILE).read_text(encoding="utf-8")
+    except (OSError, ValueError):
+        return False
+    return written == json_text(fit.to_document()) and all((folder / n).is_file() for n in names)
 
 
 def _write_files(folder: Path, fit: Fit) -> None:
@@ -202,23 +240,29 @@ def _write_files(folder: Path, fit: Fit) -> None:
     for j, name in enumerate(table.target_names):
         columns[f"{name}_simulated"] = table.targets[rows, j]
         columns[f"{name}_predicted"] = fit.predicted[rows, j]
-    write_json(folder / "fit.json", fit.to_document())
     write_csv(folder / "test_rows.csv", columns)
     draw_parity(folder / "parity.png", fit_title(fit), held_out(fit))
     if fit.network is not None:
         write_text(folder / "network.json", to_json(fit.network))
     else:
         (folder / "network.json").unlink(missing_ok=True)
+    write_json(folder / FIT_FILE, fit.to_document())
 
 
 def fit_files(folder: Path) -> list[Path]:
     """Files of a fit that mean the same elsewhere."""
-    return sorted(path for path in folder.iterdir() if path.is_file() and path.name != FIT_STORE)
+    # Earlier versions kept a pickle here; it is never opened.
+    return sorted(path for path in folder.iterdir() if path.is_file() and path.suffix != ".pickle")
 
 
 def write_json(path: Path, document: dict[str, Any]) -> Path:
     """Write plain JSON values."""
-    return write_text(path, json.dumps(document, indent=2, allow_nan=False) + "\n")
+    return write_text(path, json_text(document))
+
+
+def json_text(document: dict[str, Any]) -> str:
+    """Plain JSON values as the text of a file."""
+    return json.dumps(document, indent=2, allow_nan=False) + "\n"
 
 
 def fit_title(fit: Fit) -> str:

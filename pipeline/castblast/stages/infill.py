@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,11 +18,9 @@ from castblast.errors import SpecError
 from castblast.network import Floats, Network, explosive_index, member_spread
 from castblast.progress import ProgressCallback, part, silent
 from castblast.resources import is_bare_name
+from castblast.specs.model import ModelSpec, make_model_spec, read_model_spec, refuse_code
 from castblast.specs.recipe import Recipe
 from castblast.surrogate.infill import POOL_FACTOR, choose_batch, infill_worth
-
-if TYPE_CHECKING:
-    from castblast.specs.model import ModelSpec
 
 #: Batch numbers from here on are for pools: no dataset gets that far, so a later extension never
 #: draws the numbers of a pool again.
@@ -46,6 +44,7 @@ def infill(
     out: Path,
     *,
     members: int = 3,
+    allow_code: bool = False,
     progress: ProgressCallback = silent,
 ) -> InfillOutcome:
     """Choose the next designs to simulate and write them as a design file.
@@ -61,16 +60,25 @@ def infill(
     out : Path
         CSV for ``castblast dataset extend --design``.
 
+    members : int
+        Random starts, where the spec is fitted anew.
+    allow_code : bool
+        Run the Python code that a spec of kind ``custom`` names.
+    progress : callable
+
     Raises
     ------
     SpecError
-        Unusable model, or rows that cannot be drawn.
+        Unusable model, one that runs code of its own, or rows that cannot be drawn.
     DatasetError, CheckError, StaleResultError
         The dataset cannot be read or extended.
     """
     if rows < 1:
         message = f"rows: {rows}; at least 1 is needed"
         raise SpecError(message)
+    found = _find_model(model)
+    if not isinstance(found, Network):
+        refuse_code([found], allowed=allow_code)
     existing = read_existing(dataset, lambda _, line: progress(0.0, line))
     recipe = existing.source.recipe
     names = tuple(entry.name for entry in existing.explosives)
@@ -85,7 +93,7 @@ def infill(
         first_batch=_POOL_BATCH + int(existing.design.batch.max()),
     )
     labels = [names[kind] for kind in pool.explosive.tolist()]
-    targets, spread = _spread(existing, model, pool, labels, members, part(progress, 0.1, 0.9))
+    targets, spread = _spread(existing, found, pool, labels, members, part(progress, 0.1, 0.9))
     progress(0.9, "choosing")
     kinds = pool.explosive.astype(np.int64)
     chosen = choose_batch(shares_of(recipe, pool.columns), kinds, infill_worth(spread), rows)
@@ -110,14 +118,13 @@ def shares_of(recipe: Recipe, columns: Mapping[str, Floats]) -> Floats:
 
 def _spread(
     existing: Existing,
-    model: Path,
+    found: Network | ModelSpec,
     pool: Design,
     labels: list[str],
     members: int,
     progress: ProgressCallback,
 ) -> tuple[tuple[str, ...], Floats]:
     """Targets, and relative spread of the ensemble for every row of the pool."""
-    found = _find_model(model)
     if isinstance(found, Network):
         numeric = np.stack([pool.inputs[name] for name in found.input_names], axis=1)
         index = np.array([explosive_index(found, name) for name in labels], dtype=np.int64)
@@ -136,10 +143,7 @@ def _spread(
 
 def _find_model(model: Path) -> Network | ModelSpec:
     """Give the network of a fit if it has members, else the spec to fit members from."""
-    from pydantic import TypeAdapter, ValidationError
-
     from castblast.export.json_file import read_network
-    from castblast.specs.model import ModelSpec, read_model_spec
     from castblast.stages.export import find_network
 
     if model.suffix in (".yaml", ".yml") or (is_bare_name(model) and not model.is_dir()):
@@ -149,11 +153,10 @@ def _find_model(model: Path) -> Network | ModelSpec:
     if network.members:
         return network
     try:
-        found: ModelSpec = TypeAdapter(ModelSpec).validate_python(network.provenance["spec"])
-    except (KeyError, ValidationError):
+        return make_model_spec(network.provenance.get("spec"), f"{path}: spec", path.parent)
+    except SpecError:
         message = f"{path}: has no members and no usable spec; give the model spec (YAML) instead"
         raise SpecError(message) from None
-    return found
 
 
 def _outcome(

@@ -44,6 +44,7 @@ def train(
     workers: int | None = 1,
     tracking: bool = False,
     runs: Path = RUNS_FOLDER,
+    allow_code: bool = False,
     progress: ProgressCallback = silent,
 ) -> TrainOutcome:
     """Fit every spec and score it on rows never trained on; fits that are there stay.
@@ -60,6 +61,8 @@ def train(
         Fits at a time; None: the cores there are.
     tracking : bool
         Keep a record in MLflow under `runs`; changes no result.
+    allow_code : bool
+        Run the Python code that specs of kind ``custom`` name.
     progress : callable
 
     Raises
@@ -67,13 +70,14 @@ def train(
     MissingLibraryError
         A library that training, one of the specs or the record needs is not installed.
     SpecError
-        An unusable spec.
+        An unusable spec, or one that runs code of its own.
     DatasetError
         An unusable dataset: damaged, missing columns, too few rows.
     """
-    from castblast.specs.model import read_model_specs
+    from castblast.specs.model import read_model_specs, refuse_code
 
     chosen = read_model_specs(list(specs) or [resource("models/specs/reference_mlp.yaml")])
+    refuse_code(chosen, allowed=allow_code)
     require_training("castblast train", chosen, tracking=tracking)
     from castblast.dataset.store import open_dataset
     from castblast.files import require_writable

@@ -28,6 +28,7 @@ def tune(
     seed: int = 0,
     tracking: bool = False,
     runs: Path = RUNS_FOLDER,
+    allow_code: bool = False,
     progress: ProgressCallback = silent,
 ) -> TrainOutcome:
     """Search the space that a spec declares under ``search``.
@@ -51,6 +52,8 @@ def tune(
         Of the sampler.
     tracking : bool
         Keep a record in MLflow under `runs`; changes no result.
+    allow_code : bool
+        Run the Python code that specs of kind ``custom`` name.
     progress : callable
 
     Raises
@@ -62,9 +65,10 @@ def tune(
     DatasetError
         An unusable dataset.
     """
-    from castblast.specs.model import read_model_spec
+    from castblast.specs.model import read_model_spec, refuse_code
 
     wanted = read_model_spec(spec)
+    refuse_code([wanted], allowed=allow_code)
     require_training("castblast tune", [wanted], "tune", tracking=tracking)
     from castblast.dataset.store import open_dataset
     from castblast.files import require_writable

@@ -1,7 +1,8 @@
-"""Finished fits kept on disk, so that the same spec on the same rows is never fitted twice.
+"""Finished fits kept on this machine, so that the same spec on the same rows is not fitted twice.
 
 A working store like compiled code, not a format of exchange: it holds pickled estimators, is read
-by the version that wrote it only, and must not be taken from strangers. ``network.json`` travels.
+by the version that wrote it only, and lies in the user's own cache (`kept`), never beside a dataset
+or in a folder of fits. What travels are ``fit.json`` and ``network.json``.
 """
 
 from __future__ import annotations
@@ -20,16 +21,16 @@ import numpy as np
 
 from castblast import __version__
 from castblast.errors import SpecError
-from castblast.files import write_with
 from castblast.specs.model import CustomSpec, ModelSpec
 from castblast.surrogate.custom import importable
 from castblast.surrogate.features import Table
+from castblast.surrogate.kept import keep, kept
 from castblast.surrogate.training import Fit
 
 #: Modules of this folder that look at fits but have no part in making one.
 _OBSERVERS = (
     "comparison", "gate", "shifts", "strata", "learning", "sensitivity", "tuning", "tuning_space",
-    "study_file", "timing", "tracking", "logged_model", "run_list", "infill", "probe",
+    "study_file", "timing", "tracking", "logged_model", "run_list", "infill", "probe", "kept",
     "domain", "ensemble", "fit_store", "torch_onnx", "history_modes",
 )  # fmt: skip
 _LIBRARIES = ("numpy", "scikit-learn", "torch")
@@ -112,54 +113,86 @@ def _version(library: str) -> str:
         return ""
 
 
-def save_kept(path: Path, value: Any, key: Mapping[str, str], spec: Any = None) -> bool:
-    """Keep a result with what it was made from; False where it cannot be pickled.
+def save_kept(place: Path, value: Any, key: Mapping[str, str], spec: Any = None) -> bool:
+    """Keep a result with what it was made from; False where nothing can be kept.
 
-    That may happen to a fit whose estimator is a user's own.
+    Parameters
+    ----------
+    place : path
+        What it belongs to: the folder of a fit, for one.
+    value : object
+        One that cannot be pickled, as a user's own estimator may be, is not kept.
+    key : mapping
+        What it was made from.
+    spec : ModelSpec, optional
     """
-    try:
-        inside = pickle.dumps(value, protocol=5)
-    except (pickle.PicklingError, AttributeError, TypeError):
+    inside = packed(value)
+    if inside is None:
         return False
-    content = pickle.dumps({"key": dict(key), "spec": spec, "value": inside}, protocol=5)
-    write_with(path, lambda name: name.write_bytes(content))
-    return True
+    return keep(place, pickle.dumps({"key": dict(key), "spec": spec, "value": inside}, protocol=5))
 
 
-def load_kept(path: Path, key: Mapping[str, str]) -> Any:
+def packed(value: Any) -> bytes | None:
+    """Pickle a result; None where it cannot be."""
+    try:
+        return pickle.dumps(value, protocol=5)
+    except (pickle.PicklingError, AttributeError, TypeError):
+        return None
+
+
+def unpacked(content: bytes, spec: ModelSpec) -> Fit | None:
+    """Open what a process of our own has just packed; never call it on a file."""
+    with importable(str(getattr(spec, "folder", ""))):
+        fit = _unpickle(content)
+    return fit if isinstance(fit, Fit) else None
+
+
+def load_kept(place: Path, key: Mapping[str, str]) -> Any:
     """Give what was made from exactly `key`; None if there is none or it is unreadable."""
-    stored = _unpickle(path.read_bytes()) if path.is_file() else None
+    stored = _opened(place)
     if not isinstance(stored, dict) or stored.get("key") != dict(key):
         return None
     with importable(str(getattr(stored.get("spec"), "folder", ""))):
         return _unpickle(stored["value"])
 
 
-def load_fit(path: Path, key: Mapping[str, str]) -> Fit | None:
-    """Give the fit that was made from exactly `key`, if it is there."""
-    fit = load_kept(path, key)
+def load_fit(place: Path, key: Mapping[str, str]) -> Fit | None:
+    """Give the fit of a folder that was made from exactly `key`, if it is there."""
+    fit = load_kept(place, key)
     return fit if isinstance(fit, Fit) else None
 
 
-def open_fit(path: Path) -> Fit:
-    """Give a fit that is kept in a file, whatever rows it was fitted on.
+def is_kept(place: Path) -> bool:
+    """Whether this user keeps a fit of a folder on this machine."""
+    return kept(place) is not None
+
+
+def kept_spec(place: Path) -> ModelSpec | None:
+    """Spec as it was given to the fit of a folder that is kept on this machine, if one is."""
+    stored = _opened(place)
+    spec: ModelSpec | None = stored.get("spec") if isinstance(stored, dict) else None
+    return spec
+
+
+def open_fit(place: Path) -> Fit:
+    """Give the fit of a folder that is kept on this machine, whatever rows it was fitted on.
 
     Raises
     ------
     SpecError
-        The file is damaged, needs what is missing here, or was written by other code, with which
-        the fit may answer otherwise than when it was trained.
+        None is kept here, it needs what is missing here, or it was made by other code, with which
+        it may answer otherwise than when it was trained.
     """
-    stored = _unpickle(path.read_bytes())
+    stored = _opened(place)
     spec = stored.get("spec") if isinstance(stored, dict) else None
     if spec is None:
-        message = f"{path}: holds no fit; run castblast train again"
+        message = f"{place}: its fit is not kept on this machine; run castblast train again"
         raise SpecError(message)
     now = _code_key(spec)
     changed = [name for name, value in now.items() if stored["key"].get(name) != value]
     if changed:
         message = (
-            f"{path}: was fitted with other {', '.join(changed)} than there is now; "
+            f"{place}: was fitted with other {', '.join(changed)} than there is now; "
             "run castblast train again"
         )
         raise SpecError(message)
@@ -167,19 +200,18 @@ def open_fit(path: Path) -> Fit:
         with importable(str(getattr(spec, "folder", ""))):
             fit = pickle.loads(stored["value"])
     except Exception as fault:  # whatever a module of a user's own raises when it is imported
-        message = f"{path}: cannot be read: {fault}"
+        message = f"{place}: its fit cannot be read: {fault}"
         raise SpecError(message) from fault
     if not isinstance(fit, Fit):
-        message = f"{path}: holds a {type(fit).__name__}, no fit"
+        message = f"{place}: holds a {type(fit).__name__}, no fit"
         raise SpecError(message)
     return fit
 
 
-def kept_spec(path: Path) -> ModelSpec | None:
-    """Spec of the fit that is kept in a file, whatever it was fitted on; None if unreadable."""
-    stored = _unpickle(path.read_bytes())
-    spec: ModelSpec | None = stored.get("spec") if isinstance(stored, dict) else None
-    return spec
+def _opened(place: Path) -> Any:
+    """What is kept under a place, once its seal was found to be our own; None if there is none."""
+    content = kept(place)
+    return None if content is None else _unpickle(content)
 
 
 def _unpickle(content: bytes) -> Any:
