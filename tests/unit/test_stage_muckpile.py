@@ -10,10 +10,13 @@ import numpy as np
 import pytest
 import yaml
 
+from castblast.bands import BAND_WORDS, BASIS, show_band, show_value
 from castblast.errors import SpecError
 from castblast.stages.muckpile import run_muckpile
 from castblast.stages.muckpile_compare import run_seeds
 from castblast.stages.muckpile_extras import Extras
+from castblast.stages.muckpile_results import metric_rows
+from castblast.stages.predict import predict
 
 SMALL: dict[str, Any] = {
     "name": "small",
@@ -94,6 +97,37 @@ def test_a_second_run_reuses_the_packing_and_repeats_every_file(
     assert again["packing_reused"]
     assert not document["packing_reused"]
     assert {name for name in FILES if (out / name).read_bytes() != before[name]} == set()
+
+
+def test_a_given_velocity_is_said_to_be_given(run: tuple[Path, Path, dict[str, Any]]) -> None:
+    _, out, document = run
+    stored = json.loads((out / "metrics.json").read_text())
+    assert (stored["velocity_source"], stored["prediction_band"]) == ("given", {})
+    assert metric_rows(document)[0] == ("burden velocity", "6, as given", "m/s")
+
+
+def test_a_predicted_velocity_has_its_band_and_its_domain(tmp_path: Path) -> None:
+    """A bench of 3 m is lower than any in training: said in words, with the value at fault."""
+    surrogate = {"explosive": "anfo", "hole_diameter": "102 mm", "stemming_length": "1 m"}
+    spec = {k: v for k, v in SMALL.items() if k != "velocity"}
+    bench = written(tmp_path, spec | {"surrogate": surrogate, "balls": {"count": 60}})
+    outcome = run_muckpile(bench, tmp_path / "out", threads=1)
+    stored = json.loads((tmp_path / "out" / "metrics.json").read_text())
+    asked = {name: stored["surrogate"]["inputs"][name] for name in ("burden", "bench_height")}
+    assert asked == {"burden": 2.0, "bench_height": 3.0}
+    speed, band = stored["initial_velocity"], stored["prediction_band"]["burden_velocity"]
+    answer = predict(stored["surrogate"]["inputs"], "anfo")
+    assert answer["burden_velocity"] == pytest.approx(speed)
+    assert band == pytest.approx(answer["prediction_band"]["burden_velocity"])
+    assert outcome.rows[0] == (
+        "burden velocity",
+        f"{show_value('burden_velocity', speed)} ({show_band('burden_velocity', speed)})",
+        "m/s",
+    )
+    assert outcome.remarks[0] == BAND_WORDS
+    assert any(line.startswith("outside the training data: bench_height = 3 m") for line in
+               outcome.remarks)  # fmt: skip
+    assert BASIS in stored["prediction_basis"]["words"]
 
 
 def test_ore_and_frames(run: tuple[Path, Path, dict[str, Any]], tmp_path: Path) -> None:

@@ -140,6 +140,8 @@ def compare_muckpiles(
 
 def _show(screen: Screen, outcome: "MuckpileOutcome") -> Mapping[str, Any]:
     screen.table(("quantity", "value", "unit"), outcome.rows, title=outcome.title)
+    for line in outcome.remarks:
+        screen.note(line)
     for path in outcome.files:
         screen.say(f"wrote {path}")
     return outcome.document

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -134,11 +135,17 @@ def _prediction(folder: Path) -> Section:
     )
 
 
+def _thrown_at(metrics: Mapping[str, Any]) -> str:
+    """Velocity with its band: the demo throws the bench with the answer of its own network."""
+    speed = metrics["initial_velocity"]
+    return f"{show_value('burden_velocity', speed)} ({show_band('burden_velocity', speed)})"
+
+
 def _muckpile(folder: Path) -> Section:
     metrics = _read(folder / "metrics.json")
     title = (
         f"{metrics['balls']:,} balls of mean radius {metrics['mean_radius']:.2f} m, thrown at "
-        f"{metrics['initial_velocity']:.1f} m/s, at rest after {metrics['simulated_time']:.1f} s."
+        f"{_thrown_at(metrics)} m/s, at rest after {metrics['simulated_time']:.1f} s."
     )
     captions = {
         "section": "Cross-section, balls coloured by block",

@@ -38,6 +38,7 @@ from castblast.stages.muckpile_results import (
     write_results,
 )
 from castblast.stages.muckpile_start import make_start
+from castblast.stages.muckpile_velocity import velocity_remarks
 
 _PACKING_SHARE, _CAST_SHARE = 0.25, 0.95
 _MAX_VELOCITY = 100.0
@@ -124,7 +125,8 @@ def run_muckpile(
     case = _case(spec, walls, start.balls, plan, threads)
     _require_possible(spec, case, path.parent)
     if decks.wanted:
-        return write_decks(spec, case, decks)
+        written = write_decks(spec, case, decks)
+        return replace(written, remarks=velocity_remarks(plan.prediction))
     folder.mkdir(parents=True, exist_ok=True)
     result, frames = _simulate(
         spec, case, folder, extras, wanted.interval, _part(progress, _PACKING_SHARE, _CAST_SHARE)
@@ -143,7 +145,7 @@ def run_muckpile(
     outcome = replace(outcome, document=outcome.document | more)
     files = write_results(folder, spec, case, result, outcome.document, ore, plan.label) + frames
     progress(1.0, f"{result.time:.1f} s simulated")
-    return MuckpileOutcome(outcome.document, outcome.title, outcome.rows, files)
+    return replace(outcome, files=files)
 
 
 def _simulate(

@@ -106,9 +106,10 @@ def run_seeds(
         def report(share: float, line: str, k: int = k) -> None:
             progress((k + share) / seeds, f"seed {first + k}: {line}")
 
-        files += run_muckpile(bench, folders[-1], seed=first + k, progress=report, **options).files
+        run = run_muckpile(bench, folders[-1], seed=first + k, progress=report, **options)
+        files += run.files
     compared = compare_runs(folders, folder)
-    return replace(compared, files=files + compared.files)
+    return replace(compared, files=files + compared.files, remarks=run.remarks)
 
 
 def metric_bands_of(documents: Sequence[Mapping[str, Any]]) -> dict[str, Band]:

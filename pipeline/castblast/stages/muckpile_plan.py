@@ -19,8 +19,10 @@ from castblast.specs.holes import Holes, blocks_of_holes, read_holes
 
 #: Neighbours of a hole, over the larger of burden and spacing: those beside it and across.
 _NEIGHBOURS = 1.5
-_KEPT = ("explosive", "burden_velocity", "inputs", "in_domain", "domain_faults", "model")
+_KEPT = ("explosive", "burden_velocity", "inputs", "in_domain", "domain", "domain_faults", "model")
 _MOST_FAULTS = 5
+#: From good to bad.
+_VERDICTS = ("inside", "unusual", "outside")
 #: A hole that gives one of these says how it is charged: those of the bench are not its own.
 _SHARED = frozenset({"stemming_length", "charge_length"})
 
@@ -155,7 +157,7 @@ def _common_speed(spec: BenchSpec) -> tuple[float, dict[str, Any] | None]:
     except SpecError as fault:
         lines = [f"{spec.name}: surrogate: {line}" for line in str(fault).splitlines()]
         raise SpecError("\n".join(lines)) from None
-    return answer["burden_velocity"], {key: answer[key] for key in _KEPT}
+    return answer["burden_velocity"], {key: answer[key] for key in _KEPT} | _velocity_band(answer)
 
 
 def _predict(design: Mapping[str, Any]) -> dict[str, Any]:
@@ -219,6 +221,11 @@ def _charged(design: Mapping[str, Any], hole: Mapping[str, Any]) -> dict[str, An
     return full
 
 
+def _velocity_band(answer: Mapping[str, Any]) -> dict[str, Any]:
+    """What the network says of its own error in the velocity; the same share for all designs."""
+    return {"network_band": {"burden_velocity": answer["network_band"]["burden_velocity"]}}
+
+
 def _summary(answers: list[dict[str, Any]]) -> dict[str, Any] | None:
     """One document for the answers of many holes."""
     if not answers:
@@ -231,7 +238,9 @@ def _summary(answers: list[dict[str, Any]]) -> dict[str, Any] | None:
         "least_burden_velocity": min(speeds),
         "largest_burden_velocity": max(speeds),
         "holes": len(answers),
+        **_velocity_band(answers[0]),
         "in_domain": all(answer["in_domain"] for answer in answers),
+        "domain": max((answer["domain"] for answer in answers), key=_VERDICTS.index),
         "domain_faults": list(faults)[:_MOST_FAULTS],
         "model": answers[0]["model"],
     }

@@ -29,6 +29,11 @@ from castblast.stages.muckpile_tables import (
     pile_surface,
     profile_columns,
 )
+from castblast.stages.muckpile_velocity import (
+    describe_velocity,
+    velocity_remarks,
+    velocity_words,
+)
 from castblast.stages.reuse import file_hash
 
 #: Unit of every number in the document; "1": none.
@@ -37,6 +42,7 @@ DOCUMENT_UNITS = {
     "mean_radius": "m",
     "solid_fraction": "1",
     "initial_velocity": "m s-1",
+    "prediction_band": "m s-1",
     "simulated_time": "s",
     **UNITS,
     "ledger": "J, residual 1",
@@ -54,6 +60,7 @@ class MuckpileOutcome:
     title: str
     rows: list[tuple[str, str, str]]
     files: list[Path] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
 
 
 class Start(NamedTuple):
@@ -98,7 +105,7 @@ def describe_run(
         "solid_fraction": start.solid_fraction,
         "packing_settled": start.settled,
         "packing_reused": start.reused,
-        "initial_velocity": speed,
+        **describe_velocity(speed, prediction),
         "surrogate": dict(prediction) if prediction else None,
         "simulated_time": result.time,
         **metrics._asdict(),
@@ -110,10 +117,14 @@ def describe_run(
         "seconds": seconds,
     }
     plain: dict[str, Any] = _plain(document)
-    title = f"{spec.name}: {plain['balls']:,} balls, {speed:.3g} m/s, {result.time:.1f} s simulated"
+    title = (
+        f"{spec.name}: {plain['balls']:,} balls, {velocity_words(plain)} m/s, "
+        f"{result.time:.1f} s simulated"
+    )
     if Status(result.status) is Status.NOT_CONVERGED:
         title += " (longest time reached before the pile came to rest)"
-    return MuckpileOutcome(plain, title, metric_rows(plain))
+    remarks = velocity_remarks(prediction)
+    return MuckpileOutcome(plain, title, metric_rows(plain), remarks=remarks)
 
 
 def bench_content(spec: BenchSpec, beside: Path) -> dict[str, Any]:
@@ -144,7 +155,8 @@ def metric_rows(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         ("open energy balance", _scaled(document["ledger"]["residual"], 100.0), "%"),
         ("time on the clock", document.get("seconds"), "s"),
     )
-    rows = [
+    rows = [("burden velocity", velocity_words(document), "m/s")]
+    rows += [
         (name, "-" if value is None else f"{value:.3g}", unit)
         for name, value, unit in entries
         if name != "time on the clock" or value is not None

@@ -155,13 +155,18 @@ def predict_design(
     rows = [_row(model, name, document) for name in model.output_names]
     shown = ", ".join(f"{c.name} {c.show(document['inputs'][c.name])}" for c in model.inputs)
     remarks = [f"inputs: {shown}", BAND_WORDS]
-    lead = "unusual among" if document["domain"] == "unusual" else "outside"
-    remarks += [f"{lead} the training data: {line}" for line in document["domain_faults"]]
+    remarks += domain_remarks(document)
     score = document["density_score"]
     if score is not None and document["in_domain"]:
         remarks.append(f"inside the training data: density score {score:.2f}, the limit is 1")
     title = f"{document['explosive']}, {document['model']['name']}"
     return Prediction(document, title, rows, remarks)
+
+
+def domain_remarks(document: Mapping[str, Any]) -> list[str]:
+    """Lines about an answer that is not inside the training data, one for each reason."""
+    lead = "unusual among" if document["domain"] == "unusual" else "outside"
+    return [f"{lead} the training data: {line}" for line in document["domain_faults"]]
 
 
 def _row(model: Network, name: str, document: Mapping[str, Any]) -> tuple[str, str, str, str]:
