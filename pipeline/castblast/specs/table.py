@@ -18,10 +18,10 @@ from castblast.errors import SpecError
 from castblast.specs.quantity import QuantityError
 from castblast.specs.table_cells import Faults, NumberColumn, shown
 from castblast.specs.table_heads import Form, Head, Rows, read_heads, with_unit_row
-from castblast.specs.table_text import open_sheet
+from castblast.specs.table_text import Sheet, open_sheet
 from castblast.specs.units import scaled, unit_factor
 
-__all__ = ["ID_HEADS", "Form", "Table", "read_table"]
+__all__ = ["ID_HEADS", "Form", "Table", "read_table", "table_of"]
 
 #: Heads of a column that names the rows.
 ID_HEADS = ("id", "name", "label", "hole", "hole_id", "hole_name", "hole_no", "hole_number")
@@ -83,7 +83,11 @@ def read_table(path: Path, form: Form) -> Table:
     SpecError
         One line per fault, with file, line and column; the first twenty.
     """
-    sheet = open_sheet(path)
+    return table_of(path, open_sheet(path), form)
+
+
+def table_of(path: Path, sheet: Sheet, form: Form) -> Table:
+    """Read a sheet that is open already; see `read_table`."""
     heads, rows = read_heads(path, sheet, form)
     rows = with_unit_row(path, form, heads, rows)
     faults = Faults()

@@ -38,6 +38,8 @@ class Form:
         Heads of a column that names the rows; (): none.
     unique_ids : bool
         No row is without an id, and no two have the same.
+    loose : bool
+        Heads that are not known are left out; otherwise they are refused.
     bare : bool
         A head without a unit is in SI; otherwise it is refused.
     chosen : mapping of str to str
@@ -55,6 +57,7 @@ class Form:
     aliases: Mapping[str, str] = field(default_factory=dict)
     ids: Sequence[str] = ()
     unique_ids: bool = False
+    loose: bool = False
     bare: bool = False
     chosen: Mapping[str, str] = field(default_factory=dict)
     instead: Mapping[str, Sequence[str]] = field(default_factory=dict)
@@ -195,7 +198,7 @@ def _head_faults(where: str, sheet: Sheet, heads: list[Head], form: Form) -> lis
         if head.kind in ("number", "text", "label") and key in seen:
             faults.append(f"{place}: given twice")
         seen.add(key)
-        if head.kind == "unknown":
+        if head.kind == "unknown" and not form.loose:
             hint = nearest_name(head.name, form.names())
             known = "; known: " + ", ".join(form.names()[:_KNOWN_SHOWN])
             faults.append(f"{place}: unknown column{hint or known}")

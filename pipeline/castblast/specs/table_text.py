@@ -70,8 +70,10 @@ class Sheet(NamedTuple):
     separator: str
 
 
-def open_sheet(path: Path) -> Sheet:
+def open_sheet(path: Path, lines: list[str] | None = None) -> Sheet:
     """Read a file as far as its heads; rows follow one by one.
+
+    `lines` are those of `read_lines`, where the file has been read already.
 
     Raises
     ------
@@ -79,11 +81,7 @@ def open_sheet(path: Path) -> Sheet:
         One line: no file, no text, another kind of file, nothing in it, a line or a table beyond
         all bounds. The rows may raise it too, with their line.
     """
-    data = read_bytes(path, "table", MOST_BYTES)
-    for mark, words in _FOREIGN:
-        if data.startswith(mark):
-            raise SpecError(f"{path}: {words}")
-    lines = _lines(decode(path, data), path)
+    lines = read_lines(path) if lines is None else lines
     remarks: list[tuple[int, str]] = []
     separator, at = "", -1
     for at, line in enumerate(lines):
@@ -151,9 +149,19 @@ def _decoded(path: Path, data: bytes, encoding: str) -> str:
     return text
 
 
-def _lines(text: str, path: Path) -> list[str]:
-    """Lines of a text with their ends, none of them beyond all bounds."""
-    lines = io.StringIO(text, newline=None).readlines()
+def read_lines(path: Path) -> list[str]:
+    """Read the lines of a table, with their ends, none of them beyond all bounds.
+
+    Raises
+    ------
+    SpecError
+        One line, as `open_sheet`.
+    """
+    data = read_bytes(path, "table", MOST_BYTES)
+    for mark, words in _FOREIGN:
+        if data.startswith(mark):
+            raise SpecError(f"{path}: {words}")
+    lines = io.StringIO(decode(path, data), newline=None).readlines()
     if max(map(len, lines), default=0) > LONGEST_LINE:
         number = next(k for k, line in enumerate(lines, 1) if len(line) > LONGEST_LINE)
         raise SpecError(
