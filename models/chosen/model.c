@@ -1,9 +1,14 @@
 /* Surrogate "levenberg", trained on full 1.1.0. Use model.h.
  *
- *     cc -std=c99 -O2 -c model.c
+ *     cc -std=c99 -O2 -c model.c        (without -ffast-math, which it refuses)
  *     cc -std=c99 -O2 -DCASTBLAST_SELF_TEST model.c -lm -o model_test && ./model_test
  */
 #include "model.h"
+
+/* Fast mathematics drop NaN, and with it every sign that a design is outside the domain. */
+#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__) || defined(_M_FP_FAST)
+#error "castblast model.c: -ffast-math (-Ofast, /fp:fast) is not allowed; compile without it"
+#endif
 
 #include <math.h>
 #include <string.h>

@@ -39,8 +39,8 @@ extern "C" {
 /* Positions in `inputs`; the training range is in castblast_lower and castblast_upper. */
 enum {
   CASTBLAST_UCS = 0, /* [Pa] uniaxial compressive strength */
-  CASTBLAST_YOUNG_MODULUS = 1, /* [Pa] Young's modulus */
-  CASTBLAST_POISSON_RATIO = 2, /* [1] Poisson's ratio */
+  CASTBLAST_YOUNG_MODULUS = 1, /* [Pa] Young_s modulus */
+  CASTBLAST_POISSON_RATIO = 2, /* [1] Poisson_s ratio */
   CASTBLAST_ROCK_DENSITY = 3, /* [kg m-3] rock density */
   CASTBLAST_FRICTION_ANGLE = 4, /* [rad] internal friction angle */
   CASTBLAST_DILATION_ANGLE = 5, /* [rad] dilation angle */

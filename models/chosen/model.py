@@ -47,7 +47,7 @@ NETWORK = json.loads(r'''{
     {
       "name": "young_modulus",
       "unit": "Pa",
-      "title": "Young's modulus",
+      "title": "Young\u0027s modulus",
       "shown_unit": "GPa",
       "shown_factor": 1e-09,
       "log": true,
@@ -60,7 +60,7 @@ NETWORK = json.loads(r'''{
     {
       "name": "poisson_ratio",
       "unit": "1",
-      "title": "Poisson's ratio",
+      "title": "Poisson\u0027s ratio",
       "shown_unit": "1",
       "shown_factor": 1.0,
       "log": false,

@@ -13,6 +13,7 @@ import io
 from castblast.errors import SpecError
 from castblast.export.plain import Files, compact, identity, render
 from castblast.export.python_source import VELOCITY, to_python
+from castblast.names import cell_text
 from castblast.network import Floats, Network, evaluate_rows, in_domain
 
 #: Heads of the CSV file of a bench, before the inputs.
@@ -85,5 +86,7 @@ def bench_csv(network: Network, bench: list[tuple[str, int, list[float]]]) -> st
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow([*BENCH_HEAD, *network.input_names])
     for group, kind, row in bench:
-        writer.writerow([group, network.explosives[kind], 1.0, 0.0, 0.0, *map(repr, row)])
+        writer.writerow(
+            [group, cell_text(network.explosives[kind]), 1.0, 0.0, 0.0, *map(repr, row)]
+        )
     return stream.getvalue()

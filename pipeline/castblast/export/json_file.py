@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn, TypeVar
 
 import numpy as np
 
 from castblast.errors import SpecError
+from castblast.names import shortened
 from castblast.network import (
     SCHEMA_VERSION,
     Column,
@@ -29,8 +30,11 @@ from castblast.network import (
     Network,
     OutputColumn,
 )
+from castblast.reading import parse_json, read_text
 
 _FORMAT = "castblast network"
+#: Most bytes of a network.json; a million weights have less.
+_LARGEST = 1 << 27
 #: Layouts that are read; one of version 1 has no derived columns, density or members.
 _READABLE = (1, SCHEMA_VERSION)
 
@@ -110,35 +114,37 @@ def from_document(document: Mapping[str, Any]) -> Network:
         Another format or schema version, a missing or unusable entry.
     """
     if document.get("format") != _FORMAT:
-        message = f"not a network of castblast (format {document.get('format')!r})"
+        message = f"not a network of castblast (format {shortened(document.get('format'))})"
         raise SpecError(message)
     if document.get("schema_version") not in _READABLE:
-        found = document.get("schema_version")
-        message = f"schema version {found!r}, this one reads {' and '.join(map(str, _READABLE))}"
+        found = shortened(document.get("schema_version"))
+        message = f"schema version {found}, this one reads {' and '.join(map(str, _READABLE))}"
         raise SpecError(message)
     try:
         return _build(document)
     except KeyError as fault:
-        message = f"entry {fault} is missing"
+        message = f"entry {shortened(fault)} is missing"
         raise SpecError(message) from None
-    except (TypeError, ValueError, AttributeError) as fault:
-        message = f"unusable entry ({fault})"
+    except (TypeError, ValueError, AttributeError, OverflowError) as fault:
+        message = f"unusable entry ({shortened(fault, 150)})"
         raise SpecError(message) from None
 
 
 def _build(document: Mapping[str, Any]) -> Network:
-    golden = document["golden"]
+    golden = _group(document["golden"], "golden")
     return Network(
-        inputs=tuple(InputColumn(**entry) for entry in document["inputs"]),
-        explosives=tuple(document["explosives"]),
-        codes=_floats(document["explosive_codes"]),
-        layers=_read_chain(document["layers"]),
-        outputs=tuple(OutputColumn(**entry) for entry in document["outputs"]),
-        constraints=tuple(Constraint(**entry) for entry in document["constraints"]),
+        inputs=_records(InputColumn, document["inputs"], "inputs"),
+        explosives=_texts(document["explosives"], "explosives"),
+        codes=_floats(document["explosive_codes"], "explosive_codes"),
+        layers=_read_chain(document["layers"], "layers"),
+        outputs=_records(OutputColumn, document["outputs"], "outputs"),
+        constraints=_records(Constraint, document["constraints"], "constraints"),
         golden=GoldenRows(
-            _floats(golden["inputs"]), tuple(golden["explosives"]), _floats(golden["outputs"])
+            _floats(golden["inputs"], "golden.inputs"),
+            _texts(golden["explosives"], "golden.explosives"),
+            _floats(golden["outputs"], "golden.outputs"),
         ),
-        provenance=document["provenance"],
+        provenance=_group(document["provenance"], "provenance"),
         **(_second_version(document) if document["schema_version"] > 1 else {}),
     )
 
@@ -147,33 +153,91 @@ def _second_version(document: Mapping[str, Any]) -> dict[str, Any]:
     """Read the entries that version 1 did not have."""
     density = document["density"]
     if density is not None:
-        arrays = {key: _floats(density[key]) for key in ("centres", "whitening", "offsets")}
-        density = DensityScore(**{**density, **arrays})
+        density = _group(density, "density")
+        names = ("centres", "whitening", "offsets")
+        arrays = {key: _floats(density[key], f"density.{key}") for key in names}
+        density = _record(DensityScore, {**density, **arrays}, "density")
+    members = _list(document["members"], "members")
     return {
-        "derived": tuple(DerivedColumn(**entry) for entry in document["derived"]),
+        "derived": _records(DerivedColumn, document["derived"], "derived"),
         "density": density,
-        "members": tuple(_read_chain(member) for member in document["members"]),
+        "members": tuple(_read_chain(one, f"members[{i}]") for i, one in enumerate(members)),
     }
 
 
-def _read_chain(layers: Sequence[Mapping[str, Any]]) -> tuple[Layer, ...]:
+def _read_chain(layers: object, where: str) -> tuple[Layer, ...]:
+    chain = []
+    for number, layer in enumerate(_list(layers, where)):
+        place = f"{where}[{number}]"
+        entry = _group(layer, place)
+        weights = _floats(entry["weights"], f"{place}.weights")
+        biases = _floats(entry["biases"], f"{place}.biases")
+        activation: Any = entry["activation"]
+        if not isinstance(activation, str):
+            _refuse(f"{place}.activation", "a text is needed")
+        chain.append(Layer(weights, biases, activation))  # type: ignore[arg-type]
+    return tuple(chain)
+
+
+_Record = TypeVar("_Record")
+
+
+def _records(kind: type[_Record], entries: object, where: str) -> tuple[_Record, ...]:
     return tuple(
-        Layer(_floats(entry["weights"]), _floats(entry["biases"]), entry["activation"])
-        for entry in layers
+        _record(kind, entry, f"{where}[{i}]") for i, entry in enumerate(_list(entries, where))
     )
 
 
-def _floats(nested: list[Any]) -> Floats:
-    return np.array(nested, dtype=np.float64)
+def _record(kind: type[_Record], entry: object, where: str) -> _Record:
+    """A record from a group with just its entries."""
+    group = _group(entry, where)
+    known = fields(kind)  # type: ignore[arg-type]
+    missing = [f.name for f in known if f.default is MISSING and f.name not in group]
+    unknown = sorted(set(group) - {f.name for f in known})
+    if missing or unknown:
+        what = f"'{missing[0]}' is missing" if missing else f"'{shortened(unknown[0])}' is unknown"
+        _refuse(where, what)
+    return kind(**group)
+
+
+def _group(value: object, where: str) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        _refuse(where, "a group of entries is needed")
+    return value
+
+
+def _list(value: object, where: str) -> list[Any]:
+    if not isinstance(value, list):
+        _refuse(where, "a list is needed")
+    return value
+
+
+def _texts(value: object, where: str) -> tuple[str, ...]:
+    if not all(isinstance(entry, str) for entry in _list(value, where)):
+        _refuse(where, "a list of texts is needed")
+    return tuple(_list(value, where))
+
+
+def _floats(nested: object, where: str) -> Floats:
+    """Lists of numbers as an array; texts of numbers are none."""
+    needed = "lists of numbers, all of one length, are needed"
+    try:
+        array = np.array(_list(nested, where))
+    except (ValueError, OverflowError):
+        _refuse(where, needed)
+    if array.dtype.kind not in "iuf":
+        _refuse(where, needed)
+    return np.asarray(array, dtype=np.float64)
+
+
+def _refuse(where: str, what: str) -> NoReturn:
+    message = f"{where}: {what}"
+    raise ValueError(message)
 
 
 def from_json(text: str) -> Network:
     """Rebuild a network from its JSON text; raises `SpecError` as `from_document`."""
-    try:
-        document = json.loads(text)
-    except json.JSONDecodeError as fault:
-        message = f"line {fault.lineno}: not JSON ({fault.msg})"
-        raise SpecError(message) from None
+    document = parse_json(text)
     if not isinstance(document, dict):
         message = "not a network of castblast (no JSON object)"
         raise SpecError(message)
@@ -188,17 +252,9 @@ def read_network(path: Path) -> Network:
     SpecError
         The file is missing, unreadable or no usable network; the message names it.
     """
+    text = read_text(path, "network.json", _LARGEST)
     try:
-        return from_json(path.read_text(encoding="utf-8"))
+        return from_json(text)
     except SpecError as fault:
         lines = "\n".join(f"{path}: {line}" for line in str(fault).splitlines())
         raise SpecError(lines) from None
-    except FileNotFoundError:
-        message = f"{path}: no such file"
-        raise SpecError(message) from None
-    except UnicodeDecodeError:
-        message = f"{path}: not a text file"
-        raise SpecError(message) from None
-    except OSError as fault:
-        message = f"{path}: cannot be read ({fault.strerror})"
-        raise SpecError(message) from None

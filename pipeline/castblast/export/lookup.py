@@ -10,6 +10,7 @@ import numpy as np
 
 from castblast.design import COMPLETED, complete_columns, design_fault_columns
 from castblast.export.plain import example_row
+from castblast.names import cell_text
 from castblast.network import (
     Floats,
     InputColumn,
@@ -46,7 +47,7 @@ def lookup_csv(network: Network) -> str:
         parts = np.stack([found.values, *found.prediction], axis=2) * factors[:, None]
         for row, answer, inside in zip(rows * shown, parts, found.inside, strict=True):
             numbers = [f"{value:.6g}" for value in (*row, *answer.ravel())]
-            writer.writerow([explosive, *numbers, "inside" if inside else "unusual"])
+            writer.writerow([cell_text(explosive), *numbers, "inside" if inside else "unusual"])
     return stream.getvalue()
 
 

@@ -6,6 +6,7 @@ compute. Texts are plain ASCII: sources are read by compilers and interpreters o
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Sequence
 from math import isnan
@@ -32,6 +33,7 @@ from castblast.variables import VARIABLES
 
 #: Files of one export: name to contents.
 Files = dict[str, bytes]
+_NOT_IN_COMMENTS = re.compile(r"[^A-Za-z0-9 _.,:;+/()%#=^-]")
 _TEMPLATES = Path(__file__).parent / "templates"
 
 
@@ -170,9 +172,10 @@ def render(template: str, **values: Any) -> bytes:
         "number": _number,
         "braces": _braces,
         "quoted": quoted,
-        "comment": _comment,
+        "c_literal": c_literal,
+        "comment": comment,
         "identifier": identifier,
-        "pretty": pretty,
+        "data": data,
     }
     text = environment.get_template(template).render(**values)
     return text.encode("ascii", "backslashreplace")
@@ -198,16 +201,37 @@ def _braces(values: Sequence[Any], indent: str = "  ") -> str:
 
 
 def quoted(text: str) -> str:
-    r"""Text as a literal of C, JavaScript or Python: ASCII, no escapes but \" and \\."""
-    plain = text.encode("ascii", "replace").decode()
-    plain = "".join(letter if letter.isprintable() else " " for letter in plain)
-    return '"' + plain.replace("\\", "\\\\").replace('"', '\\"').replace("??", "? ?") + '"'
+    """Text as a literal of JavaScript or Python, ASCII; no part of it can end a script of HTML."""
+    return json.dumps(text).replace("<", "\\u003c")
 
 
-def _comment(text: str) -> str:
-    """Text that cannot end a comment."""
-    plain = "".join(letter if letter.isprintable() else " " for letter in text)
-    return plain.replace("*/", "* /").replace("/*", "/ *").replace("\\", "/")
+def c_literal(text: str) -> str:
+    """Text as a string literal of C99, ASCII; bytes beyond it are those of UTF-8."""
+    parts = []
+    for byte in text.encode("utf-8", "replace"):
+        letter = chr(byte)
+        plain = letter.isascii() and letter.isprintable() and letter not in '"\\?'
+        # Octal: three digits at most, so that a digit after it is none of it. A question mark
+        # would begin a trigraph.
+        parts.append(letter if plain else f"\\{byte:03o}")
+    return '"' + "".join(parts) + '"'
+
+
+def data(value: Any) -> str:
+    """Plain values as a literal of JavaScript, or within single quotes of Python's JSON reader.
+
+    JSON, in which neither an apostrophe nor the beginning of a tag of HTML stands as it is.
+    """
+    return pretty(value).replace("'", "\\u0027").replace("<", "\\u003c")
+
+
+def comment(text: str) -> str:
+    """Text inside a comment or a docstring, whatever the language.
+
+    Only signs stay that end no comment, string or line anywhere: no quotation marks, stars,
+    backslashes, brackets or line ends.
+    """
+    return _NOT_IN_COMMENTS.sub("_", text)
 
 
 def identifier(name: str) -> str:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from castblast.names import printable
 from castblast.network import BLAME, Column, Constraint, Floats, Network, prediction_factors
 
 if TYPE_CHECKING:
@@ -46,15 +47,30 @@ class Constants:
         if title in self.known:
             return self.known[title]
         lines = matrix.tolist() if isinstance(matrix, np.ndarray) else matrix
-        self.sheet.cell(self.row, 1, title)
+        put(self.sheet, self.row, 1, title)
         for j, line in enumerate(lines, self.row + 1):
             for i, value in enumerate(line, 1):
-                self.sheet.cell(j, i, value)
+                put(self.sheet, j, i, value)
         first, last = self.row + 1, self.row + len(lines)
         self.row = last + 2
         address = f"'{self.sheet.title}'!{span(1, first, len(lines[0]), last)}"
         self.known[title] = address
         return address
+
+
+def put(sheet: Worksheet, row: int, column: int, value: Any) -> Any:
+    """Write a number or a text into a cell; a text is a text, whatever it begins with."""
+    cell = sheet.cell(row, column)
+    cell.value = printable(value) if isinstance(value, str) else value
+    if isinstance(value, str):
+        cell.data_type = "s"  # openpyxl takes what begins with "=" for a formula
+        cell.quotePrefix = value.startswith(("=", "+", "-", "@"))
+    return cell
+
+
+def in_formula(text: str) -> str:
+    """Text as a literal of a formula."""
+    return '"' + text.replace('"', '""') + '"'
 
 
 def letter(column: int) -> str:
@@ -100,7 +116,7 @@ class _Writer:
         return f"{left.rstrip('0123456789')}{{row}}:{right.rstrip('0123456789')}{{row}}"
 
     def _titled(self, title: str, width: int) -> None:
-        self.sheet.cell(self.top - 1, self.column, title)
+        put(self.sheet, self.top - 1, self.column, title)
         self.column += width
 
 

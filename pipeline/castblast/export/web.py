@@ -47,6 +47,7 @@ def to_web(network: Network, histories: Mapping[str, Any] | None = None) -> File
     """
     model = to_javascript(network)["model.js"].decode()
     facts = json.dumps(_facts(network, histories), separators=(",", ":"), allow_nan=False)
+    facts = facts.replace("<", "\\u003c")  # no text of it can begin a tag
     script = f"{_BEGIN}{model}{_END}const facts = {facts};\n" + "".join(map(_script, _SCRIPTS))
     text = render(
         "web/page.html.j2",
@@ -124,10 +125,15 @@ def _held_lines(network: Network) -> list[str]:
 def _explosive(name: str) -> dict[str, float] | None:
     """Numbers of a catalogue explosive in SI; None if the catalogue does not have it."""
     from castblast.explosive.isentrope import pressure
+    from castblast.specs.catalogue import resolve_explosive
     from castblast.specs.explosive import load_explosive
 
+    # A name of a record is no path: whoever wrote it must not choose what is read here.
+    known = resolve_explosive(name)
+    if known is None:
+        return None
     try:
-        spec = load_explosive(name)
+        spec = load_explosive(known)
         explosive = spec.to_explosive()
     except SpecError:
         return None

@@ -17,7 +17,15 @@ import numpy as np
 from castblast.bands import BAND_WORDS
 from castblast.export.lookup import lookup_csv
 from castblast.export.plain import Files, compact
-from castblast.export.sheet_block import Block, Constants, letter, span, write_block
+from castblast.export.sheet_block import (
+    Block,
+    Constants,
+    in_formula,
+    letter,
+    put,
+    span,
+    write_block,
+)
 from castblast.extras import require
 from castblast.network import Network
 
@@ -51,19 +59,19 @@ def to_excel(network: Network) -> Files:
     constants = Constants(book.create_sheet("Network"))
     block = _working(network, constants, working)
     _check(network, constants, check)
-    _predict(network, predict, block)
+    _predict(network, predict, block, constants)
     return {"model.xlsx": _same_bytes(book), "lookup.csv": lookup_csv(network).encode()}
 
 
 def _working(network: Network, constants: Constants, sheet: Worksheet) -> Block:
     sheet.cell(1, 1, "The design of sheet Predict in SI units, step by step")
-    names = ", ".join(f'"{name}"' for name in network.explosives)
-    sheet.cell(TOP, 1, f"=MATCH(Predict!$B$4,{{{names}}},0)".replace(", ", ","))
+    names = constants.place("explosives", [list(network.explosives)])
+    sheet.cell(TOP, 1, f"=MATCH(Predict!$B$4,{names},0)")
     for i, column in enumerate(compact(network)["inputs"]):
         cell = f"Predict!$B${INPUT_TOP + i}"
         factor = column["shown_factor"]
         sheet.cell(TOP, i + 2, f'=IF(ISNUMBER({cell}),{cell}/{factor!r},"")')
-        sheet.cell(TOP - 1, i + 2, column["name"])
+        put(sheet, TOP - 1, i + 2, column["name"])
     return write_block(network, constants, sheet, TOP, 1)
 
 
@@ -76,7 +84,7 @@ def _check(network: Network, constants: Constants, sheet: Worksheet) -> None:
     if rows == 0:
         return
     for i, name in enumerate(network.input_names):
-        sheet.cell(TOP - 1, i + 2, name)
+        put(sheet, TOP - 1, i + 2, name)
     for j, (kind, row) in enumerate(zip(golden.explosives, golden.inputs.tolist(), strict=True)):
         sheet.cell(TOP + j, 1, network.explosives.index(kind) + 1)
         for i, value in enumerate(row):
@@ -95,7 +103,7 @@ def _check(network: Network, constants: Constants, sheet: Worksheet) -> None:
     sheet.freeze_panes = sheet.cell(TOP, k + 2)
 
 
-def _predict(network: Network, sheet: Worksheet, block: Block) -> None:
+def _predict(network: Network, sheet: Worksheet, block: Block, constants: Constants) -> None:
     from openpyxl.styles import Font
 
     document = compact(network)
@@ -106,7 +114,7 @@ def _predict(network: Network, sheet: Worksheet, block: Block) -> None:
         "Answers hold for the simulator that the surrogate was trained on, inside its domain only."
     )
     sheet["A3"] = "Change the blue cells."
-    _inputs(document, sheet, block)
+    _inputs(document, sheet, block, constants.known["explosives"])
     bottom = INPUT_TOP + len(document["inputs"])
     domain = f"Working!${letter(block.domain)}${TOP}"
     sheet.cell(bottom + 1, 1, "Domain")
@@ -115,7 +123,7 @@ def _predict(network: Network, sheet: Worksheet, block: Block) -> None:
     state = f"$B${bottom + 1}"
     sheet.cell(bottom + 2, 1, "Inputs at fault")
     flags = [f"Working!${letter(block.offending + i)}${TOP}" for i in range(len(network.inputs))]
-    texts = [f'IF({flag}=1,"{name} ","")'
+    texts = [f'IF({flag}=1,{in_formula(name + " ")},"")'
              for flag, name in zip(flags, network.input_names, strict=True)]  # fmt: skip
     sheet.cell(bottom + 2, 2, "=TRIM(" + "&".join(texts) + ")")
     _results(document, sheet, block, bottom + 4, state)
@@ -129,7 +137,8 @@ def _predict(network: Network, sheet: Worksheet, block: Block) -> None:
         sheet.column_dimensions[column].width = width
 
 
-def _inputs(document: dict[str, Any], sheet: Worksheet, block: Block) -> None:
+def _inputs(document: dict[str, Any], sheet: Worksheet, block: Block, explosives: str) -> None:
+    """Cells for one design; `explosives` is the range of their names."""
     from openpyxl.styles import Font, PatternFill
     from openpyxl.worksheet.datavalidation import DataValidation
 
@@ -138,8 +147,8 @@ def _inputs(document: dict[str, Any], sheet: Worksheet, block: Block) -> None:
         "fill": PatternFill("solid", fgColor="E8EEFC"),
     }
     sheet["A4"] = "Explosive"
-    sheet["B4"] = document["explosives"][0]
-    listed = DataValidation(type="list", formula1='"' + ",".join(document["explosives"]) + '"')
+    put(sheet, 4, 2, document["explosives"][0])
+    listed = DataValidation(type="list", formula1=f"={explosives}")
     listed.error = "This surrogate does not know that explosive."
     sheet.add_data_validation(listed)
     listed.add("B4")
@@ -148,11 +157,11 @@ def _inputs(document: dict[str, Any], sheet: Worksheet, block: Block) -> None:
     for i, column in enumerate(document["inputs"]):
         row, factor = INPUT_TOP + i, column["shown_factor"]
         lower, upper = column["lower"] * factor, column["upper"] * factor
-        sheet.cell(row, 1, column["title"])
+        put(sheet, row, 1, column["title"])
         sheet.cell(row, 2, column["example"] * factor)
         sheet.cell(row, 3, lower).number_format = "0.####"
         sheet.cell(row, 4, upper).number_format = "0.####"
-        sheet.cell(row, 5, column["shown_unit"])
+        put(sheet, row, 5, column["shown_unit"])
         flag = f"Working!${letter(block.offending + i)}${TOP}"
         sheet.cell(row, 6, f'=IF(ISNUMBER($B${row}),IF({flag}=1,"at fault","ok"),"no number")')
         rule = DataValidation(
@@ -180,14 +189,14 @@ def _results(
     )  # fmt: skip
     for j, column in enumerate(document["outputs"]):
         row, factor = top + 1 + j, column["shown_factor"]
-        sheet.cell(row, 1, column["title"])
+        put(sheet, row, 1, column["title"])
         for i, start in starts:
             cell = f"Working!${letter(start + j)}${TOP}*{factor!r}"
             text = f'IFERROR({cell},"{"no value" if i == 2 else "not stated"}")'
             if i > 2:
                 text = f'IF({state}="outside","unknown",{text})'
             sheet.cell(row, i, f"={text}").number_format = "0.0000"
-        sheet.cell(row, 5, column["shown_unit"])
+        put(sheet, row, 5, column["shown_unit"])
     bottom = top + 1 + len(document["outputs"])
     sheet.cell(bottom, 1, f"{BAND_WORDS[0].upper()}{BAND_WORDS[1:]}.")
     sheet.cell(

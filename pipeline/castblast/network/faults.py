@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
+from castblast.network.kinds import kind_faults
 from castblast.network.terms import SCHEMA_VERSION, Activation, Transform
 
 if TYPE_CHECKING:
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 def network_faults(network: Network) -> list[str]:
     """Say what is wrong with a network, one line each; empty if nothing is."""
     faults = []
+    if kinds := kind_faults(network):
+        return kinds
     if network.schema_version != SCHEMA_VERSION:
         faults.append(f"schema version {network.schema_version}, this one reads {SCHEMA_VERSION}")
     if not network.layers:
@@ -25,6 +28,8 @@ def network_faults(network: Network) -> list[str]:
 
 def shell_faults(shell: Shell) -> list[str]:
     """Say what is wrong around the layers of a surrogate, one line each."""
+    if kinds := kind_faults(shell):
+        return kinds  # what else there is cannot be looked at
     faults = []
     if not (shell.inputs and shell.outputs and shell.explosives):
         faults.append("needs at least one input, output and explosive")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from castblast.errors import SpecError
 from castblast.files import write_with
 from castblast.network import Network
+from castblast.reading import read_json
 from castblast.resources import resource
 
 if TYPE_CHECKING:
@@ -80,22 +81,22 @@ def read_histories(path: Path) -> Mapping[str, Any]:
     """
     from castblast.surrogate.history_modes import FORMAT, fit_history_modes
 
-    if not path.is_file():
-        message = f"{path}: no such file"
-        raise SpecError(message)
     if path.suffix != ".json":
         from castblast.dataset.store import open_dataset
 
         return fit_history_modes(open_dataset(path))
-    try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-        known = record["format"] == FORMAT
-    except (ValueError, KeyError, TypeError):
-        known = False
-    if not known:
+    record = read_json(path)
+    if not (isinstance(record, dict) and record.get("format") == FORMAT and _is_whole(record)):
         message = f"{path}: no record of pressure histories"
         raise SpecError(message)
-    return dict(record)
+    return record
+
+
+def _is_whole(record: Mapping[str, Any]) -> bool:
+    """Whether a record has the parts that are looked at here; the page looks at the others."""
+    dataset = record.get("dataset")
+    names = ("name", "dataset_version", "content_sha256")
+    return isinstance(dataset, Mapping) and all(isinstance(dataset.get(n), str) for n in names)
 
 
 def _require_fit(record: Mapping[str, Any], network: Network, path: Path) -> None:
