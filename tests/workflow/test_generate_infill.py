@@ -134,13 +134,13 @@ def test_a_design_file_keeps_every_bit(made, tmp_path) -> None:
 def test_every_fault_of_a_design_file_is_named(made, tmp_path) -> None:
     recipe = read_existing(made).source.recipe
     path = tmp_path / "bad.csv"
-    path.write_text("ucs [MPa],burdn [m],spacing [m],explosive\n")
+    path.write_text("ucs [MPa],burden [m],spacing [m],charge_length [m],explosive\n")
     with pytest.raises(SpecError, match="at least one row"):
         read_design_file(path, recipe, EXPLOSIVES)
     path.write_text("ucs [MPa],burdn [m],spacing [m],explosive\n80,3,3,anfo\n")
     with pytest.raises(SpecError) as fault:
         read_design_file(path, recipe, EXPLOSIVES)
-    for part in ("burdn", "did you mean 'burden'?", "no column 'charge_length'"):
+    for part in ("burdn", "did you mean 'burden'?", "the column 'charge_length' is missing"):
         assert part in str(fault.value)
     head = "ucs [MPa],burden [m],spacing [m],charge_length [m],explosive\n"
     rows = ["80,3,3,5,anfo", "80,3,9,5,anfo", "300,3,3,5,anfu", "80,x,3,5,anfo", "80,3,3,5"]

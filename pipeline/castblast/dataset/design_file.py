@@ -1,8 +1,8 @@
 """Rows of a dataset that a person or a model chose, instead of a Latin hypercube: as a CSV file.
 
 One row a line; heads are ``name [SI unit]`` for every variable that the recipe samples, and
-``explosive``. A quantity may carry its own unit. Values lie in the ranges of the recipe and obey
-its constraints, so that chosen rows and drawn ones fill the same domain.
+``explosive``; any form of a table is read (see `castblast.specs.table`). Values lie in the ranges
+of the recipe and obey its constraints, so that chosen rows and drawn ones fill the same domain.
 
 Chosen rows are training rows, all of them. Had they gone to the other splits too, the test rows
 would no longer be a sample of the domain, and scores before and after could not be compared.
@@ -13,8 +13,7 @@ from __future__ import annotations
 import csv
 import hashlib
 import io
-import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -24,11 +23,10 @@ from castblast.dataset.design import Design, row_faults
 from castblast.dataset.simulation import Columns, FloatArray, Simulator
 from castblast.errors import SpecError, nearest_name
 from castblast.files import write_text
-from castblast.specs.loading import read_text
-from castblast.specs.quantity import parse_quantity
+from castblast.specs.catalogue import resolve_explosive
 from castblast.specs.recipe import SPLIT_NAMES, Recipe, VariableSpec
+from castblast.specs.table import ID_HEADS, Form, Table, read_table
 
-_HEAD = re.compile(r"\s*(\w+)\s*(?:\[([^\]]*)\])?\s*")
 _ROUNDING = 1e-12
 
 
@@ -70,90 +68,61 @@ def read_design_file(
         Missing or unknown heads, values that are no numbers or outside the ranges of the recipe,
         unknown explosives: all faults, each with its line.
     """
-    reader = csv.reader(io.StringIO(read_text(path)))
-    lines = [(reader.line_num, cells) for cells in reader if any(cell.strip() for cell in cells)]
-    if len(lines) < 2:
-        raise SpecError(f"{path}: a line of heads and at least one row are needed")
-    units = _read_heads(lines[0][1], recipe, path)
-    rows: list[dict[str, float]] = []
-    kinds, faults = [], []
-    for number, cells in lines[1:]:
-        try:
-            row, kind = _read_row(dict(zip(units, cells, strict=True)), units, recipe, explosives)
-        except ValueError:
-            faults.append(f"{path}: line {number}: {len(cells)} cells for {len(units)} heads")
-        except SpecError as fault:
-            faults += [f"{path}: line {number}: {line}" for line in str(fault).splitlines()]
-        else:
-            rows.append(row)
-            kinds.append(kind)
-    if faults:
-        raise SpecError("\n".join(faults))
-    names = [spec.name for spec in (*recipe.sampled, *recipe.fixed)]
-    columns = {name: np.array([row[name] for row in rows]) for name in names}
+    form = Form(
+        columns={spec.name: spec.variable.unit for spec in recipe.sampled},
+        required=tuple(spec.name for spec in recipe.sampled),
+        texts=("explosive",),
+        ids=ID_HEADS,
+    )
+    table = read_table(path, form, lambda table: _row_faults(table, recipe, explosives))
+    if "explosive" not in table.text:
+        raise SpecError(f"{path}: the column 'explosive' is missing")
+    number = {name: k for k, name in enumerate(explosives)}
+    names = [resolve_explosive(name, explosives) or name for name in table.text["explosive"]]
+    kinds = [number[name] for name in names]
+    columns = _with_fixed(table.number, recipe, len(kinds))
     return columns, np.array(kinds, dtype=np.int8)
 
 
-def _read_heads(heads: Sequence[str], recipe: Recipe, path: Path) -> dict[str, str]:
-    """Unit of every column, in order; raises for heads that are not those of the recipe."""
-    wanted = (*(spec.name for spec in recipe.sampled), "explosive")
-    units, faults = {}, []
-    for head in heads:
-        match = _HEAD.fullmatch(head)
-        name, unit = (match[1], match[2] or "") if match else (head, "")
-        if name in units:
-            faults.append(f"head '{head}': given twice")
-        elif name not in wanted:
-            faults.append(f"head '{head}': the recipe samples no such variable"
-                          f"{nearest_name(name, wanted)}")  # fmt: skip
-        units[name] = unit
-    faults += [f"no column '{name}', which the recipe samples" for name in wanted[:-1]
-               if name not in units]  # fmt: skip
-    if "explosive" not in units:
-        faults.append("no column 'explosive'")
-    if faults:
-        raise SpecError("\n".join(f"{path}: {fault}" for fault in faults))
-    return units
-
-
-def _read_row(
-    cells: dict[str, str], units: dict[str, str], recipe: Recipe, explosives: Sequence[str]
-) -> tuple[dict[str, float], int]:
-    """Values [SI] and index of the explosive of one row."""
-    row, faults = {}, []
-    for spec in recipe.sampled:
-        text = f"{cells[spec.name].strip()} {units[spec.name]}".strip()
-        try:
-            row[spec.name] = parse_quantity(text, spec.variable.unit, spec.name)
-        except SpecError as fault:
-            faults.append(str(fault))
-    name = cells["explosive"].strip()
-    if name not in explosives:
-        hint = nearest_name(name, explosives)
-        faults.append(f"explosive '{name}': not one of the recipe{hint} ({', '.join(explosives)})")
-    if faults:
-        raise SpecError("\n".join(faults))
+def _with_fixed(given: dict[str, FloatArray], recipe: Recipe, count: int) -> dict[str, FloatArray]:
+    """Columns of all variables of the recipe: those that it samples, and those that it holds."""
+    columns = {spec.name: given[spec.name] for spec in recipe.sampled}
     # Plain values first: a ratio may be one to a variable that is held itself.
     for spec in sorted(recipe.fixed, key=lambda spec: spec.ratio_of is not None):
-        row[spec.name] = spec.at(0.0) * (1.0 if spec.ratio_of is None else row[spec.ratio_of])
-    faults = [line for spec in recipe.sampled if (line := _range_fault(spec, row))]
-    if faults:
-        raise SpecError("\n".join(faults))
-    return row, list(explosives).index(name)
+        base = np.ones(count) if spec.ratio_of is None else columns[spec.ratio_of]
+        columns[spec.name] = spec.at(0.0) * base
+    return {spec.name: columns[spec.name] for spec in (*recipe.sampled, *recipe.fixed)}
 
 
-def _range_fault(spec: VariableSpec, row: dict[str, float]) -> str:
-    """Say that a value lies outside the range of the recipe; empty if it does not."""
-    base = 1.0 if spec.ratio_of is None else row[spec.ratio_of]
-    low, high = spec.at(0.0) * base, spec.at(1.0) * base
-    # The check of a written dataset allows no rounding beyond plain ranges.
-    slack = 0.0 if spec.ratio_of is None else _ROUNDING
-    if low * (1.0 - slack) <= row[spec.name] <= high * (1.0 + slack):
-        return ""
+def _row_faults(
+    table: Table, recipe: Recipe, explosives: Sequence[str]
+) -> Iterator[tuple[int, str]]:
+    """Say which explosives and values are not those of the recipe."""
+    for row, name in enumerate(table.text.get("explosive", ())):
+        if resolve_explosive(name, explosives) is None:
+            hint = nearest_name(name, explosives)
+            known = ", ".join(explosives)
+            line = f"explosive '{name}': not one of the recipe{hint} ({known})"
+            yield int(table.line[row]), f"{table.where(row)}: {line}"
+    columns = _with_fixed(table.number, recipe, len(table.line))
+    for spec in recipe.sampled:
+        base = 1.0 if spec.ratio_of is None else columns[spec.ratio_of]
+        low, high = spec.at(0.0) * base, spec.at(1.0) * base
+        # The check of a written dataset allows no rounding beyond plain ranges.
+        slack = 0.0 if spec.ratio_of is None else _ROUNDING
+        value = columns[spec.name]
+        outside = (value < low * (1.0 - slack)) | (value > high * (1.0 + slack))
+        for row in np.flatnonzero(outside).tolist():
+            yield int(table.line[row]), f"{table.where(row)}: {_range_words(spec, columns, row)}"
+
+
+def _range_words(spec: VariableSpec, columns: Columns, row: int) -> str:
+    base = 1.0 if spec.ratio_of is None else float(columns[spec.ratio_of][row])
     shown = spec.variable.show
     ratio = "" if spec.ratio_of is None else f" at this {spec.ratio_of}"
-    value = shown(row[spec.name])
-    return f"{spec.name} = {value}: the recipe has {shown(low)} to {shown(high)}{ratio}"
+    low, high = shown(spec.at(0.0) * base), shown(spec.at(1.0) * base)
+    value = shown(float(columns[spec.name][row]))
+    return f"{spec.name} = {value}: the recipe has {low} to {high}{ratio}"
 
 
 def design_of_rows(

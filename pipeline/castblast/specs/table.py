@@ -7,7 +7,7 @@ a dataset, designs to predict. What a table may look like is said in ``data_spec
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -67,7 +67,10 @@ class Table:
         return f"{self.path}: {self.place(row)}"
 
 
-def read_table(path: Path, form: Form) -> Table:
+Check = Callable[[Table], Iterable[tuple[int, str]]]
+
+
+def read_table(path: Path, form: Form, check: Check | None = None) -> Table:
     """Read a table.
 
     Parameters
@@ -77,16 +80,19 @@ def read_table(path: Path, form: Form) -> Table:
         commas where something else separates the cells; units in brackets behind the heads, in a
         row below them, or behind each number; remarks behind ``#``.
     form : Form
+    check : callable, optional
+        Gives line and message of every further fault of the rows, told with the others. Numbers
+        that could not be read are NaN.
 
     Raises
     ------
     SpecError
         One line per fault, with file, line and column; the first twenty.
     """
-    return table_of(path, open_sheet(path), form)
+    return table_of(path, open_sheet(path), form, check)
 
 
-def table_of(path: Path, sheet: Sheet, form: Form) -> Table:
+def table_of(path: Path, sheet: Sheet, form: Form, check: Check | None = None) -> Table:
     """Read a sheet that is open already; see `read_table`."""
     heads, rows = read_heads(path, sheet, form)
     rows = with_unit_row(path, form, heads, rows)
@@ -99,6 +105,9 @@ def table_of(path: Path, sheet: Sheet, form: Form) -> Table:
     _value_faults(table, form, faults)
     if form.unique_ids:
         _label_faults(table, faults)
+    if check is not None and all(line for line, _ in faults.lines):
+        for line, message in check(table):
+            faults.add(line, message)
     if faults.count:
         raise SpecError("\n".join(faults.messages()))
     return table
