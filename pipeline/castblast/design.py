@@ -16,7 +16,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
-from math import pi
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -320,16 +319,6 @@ def resolve_design(values: Mapping[str, float]) -> dict[str, float]:
     """
     require_possible(fault_columns(values, 1))
     return {name: float(column[0]) for name, column in complete_columns(values, 1).items()}
-
-
-def charge_mass(density: float, diameter: float, length: float) -> float:
-    """Mass [kg] of a charge of `density` [kg m-3], `diameter` and `length` [m]."""
-    return density * 0.25 * pi * diameter**2 * length
-
-
-def charge_length(density: float, diameter: float, mass: float) -> float:
-    """Length [m] of a charge of `density` [kg m-3], `diameter` [m] and `mass` [kg]."""
-    return mass / (density * 0.25 * pi * diameter**2)
 
 
 def require_possible(faults: Iterable[FaultyRows]) -> None:

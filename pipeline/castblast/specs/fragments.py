@@ -8,8 +8,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, model_validator
 
-from castblast.design import charge_mass, resolve_design
+from castblast.design import resolve_design
 from castblast.errors import SpecError
+from castblast.hole import charge_mass
 from castblast.muckpile.bench import Bench
 from castblast.muckpile.fragments import (
     Pattern,

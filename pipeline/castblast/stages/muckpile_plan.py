@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from castblast.design import charge_length, complete_columns
+from castblast.design import complete_columns
 from castblast.errors import SpecError
+from castblast.hole import charge_length
 from castblast.muckpile.bench import Bench, assign_blocks, block_centres, block_velocities
 from castblast.muckpile.particles import FloatArray, IntArray
 from castblast.muckpile.timing import firing_front_azimuth, nearest_holes, scatter_delays

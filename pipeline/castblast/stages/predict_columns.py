@@ -26,6 +26,7 @@ from castblast.design import (
     name_faults,
     require_none,
 )
+from castblast.hole import expanded_hole_faults
 from castblast.network import (
     Bounds,
     DomainViolation,
@@ -34,6 +35,7 @@ from castblast.network import (
     RowPredictions,
     Shell,
     domain_violations,
+    evaluate_rows,
     explosive_index,
     keeps_ranges_and_rules,
     predict_rows,
@@ -43,6 +45,8 @@ from castblast.variables import INPUT_NAMES, VARIABLES
 
 #: Inputs that share the hole: a network that cannot see how they do so answers for another charge.
 _CHARGE = ("stemming_length", "charge_length")
+#: What a hole is as wide as when the burden begins to move.
+_EXPANSION = "expanded_hole_radius"
 #: Two values of an input are the same to this relative tolerance.
 _SAME = 1e-9
 
@@ -127,9 +131,10 @@ def predict_columns(
         Unknown names, values that are no numbers, or an input without a default that is missing.
     """
     index = np.asarray(explosive, dtype=np.int64)
-    designs = network_designs(values, len(index), network)
+    designs, full = _completed(values, len(index), network)
     numeric = np.stack(list(designs.inputs.values()), axis=1)
     rows = predict_rows(network, numeric, index)
+    designs.faults.extend(_outgrown(network, numeric, index, rows, designs, full))
     refused = _any_row(designs.faults, len(index))
     outside = ~keeps_ranges_and_rules(network, numeric)
     for entry in designs.unseen:
@@ -169,6 +174,13 @@ def _without(rows: RowPredictions, refused: NDArray[np.bool_]) -> RowPredictions
 
 def network_designs(values: InputColumns, count: int, network: Shell) -> NetworkDesigns:
     """Complete and check `count` designs for a network; see `predict_columns`."""
+    return _completed(values, count, network)[0]
+
+
+def _completed(
+    values: InputColumns, count: int, network: Shell
+) -> tuple[NetworkDesigns, dict[str, Floats]]:
+    """Designs as a network takes them, and all inputs that they have."""
     require_none(name_faults(values))
     given = as_columns(values, count)
     held = held_inputs(network)
@@ -186,7 +198,40 @@ def network_designs(values: InputColumns, count: int, network: Shell) -> Network
     faults += [
         FaultyRows(entry.rows & ~faulty, entry.say) for entry in unseen if entry.name in _CHARGE
     ]
-    return NetworkDesigns(inputs, faults, [e for e in unseen if e.name not in _CHARGE])
+    return NetworkDesigns(inputs, faults, [e for e in unseen if e.name not in _CHARGE]), full
+
+
+def _outgrown(
+    network: Network,
+    numeric: Floats,
+    index: NDArray[np.int64],
+    rows: RowPredictions,
+    designs: NetworkDesigns,
+    full: Mapping[str, Floats],
+) -> list[FaultyRows]:
+    """Designs whose hole, as predicted, expands as wide as their burden or spacing.
+
+    The hole knows rock, explosive and its own diameter only. The bench is put into its trained
+    range before the hole is asked for, and nothing is said where anything else lies outside.
+    """
+    if _EXPANSION not in network.output_names:
+        return []
+    radius = rows.values[:, network.output_names.index(_EXPANSION)].copy()
+    bench = np.array([VARIABLES[n].role == "bench" if n in VARIABLES else False
+                      for n in network.input_names])  # fmt: skip
+    lower = np.array([column.lower for column in network.inputs])
+    upper = np.array([column.upper for column in network.inputs])
+    beyond = ~((numeric >= lower) & (numeric <= upper))
+    moved = np.flatnonzero((beyond & bench).any(axis=1))
+    if len(moved):
+        near = np.where(bench, np.clip(numeric[moved], lower, upper), numeric[moved])
+        answers = evaluate_rows(network, near, index[moved])
+        radius[moved] = answers[:, network.output_names.index(_EXPANSION)]
+    known = ~(beyond & ~bench).any(axis=1) & ~_any_row(designs.faults, len(index))
+    for entry in designs.unseen:  # the answer is for another hole
+        known &= ~entry.rows
+    faults = expanded_hole_faults(full, np.where(known, radius, np.nan))
+    return [fault for fault in faults if fault.rows.any()]
 
 
 def held_inputs(network: Shell) -> dict[str, float]:

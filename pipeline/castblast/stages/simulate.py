@@ -7,11 +7,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from castblast.bands import BAND_WORDS, band_document, show_band, show_value
 from castblast.blast import BlastResult, BlastSettings, make_case, result_values, run_blast
+from castblast.design import as_columns, require_possible
 from castblast.errors import SimulationError, Status
 from castblast.extras import require
 from castblast.files import write_csv, write_text
+from castblast.hole import expanded_hole_faults
 from castblast.inputs import resolve_inputs
 from castblast.nearfield.case import EndMode, TensionMode
 from castblast.specs.case import parse_values
@@ -59,7 +63,8 @@ def simulate(
     Raises
     ------
     SpecError
-        Unknown names, units, impossible designs.
+        Unknown names, units, impossible designs; a hole that expands as wide as its burden or
+        spacing.
     CheckError
         An inconsistent explosive, unless `allow_inconsistent`.
     SimulationError
@@ -81,6 +86,10 @@ def simulate(
     result = interruptible(run_blast, case)
     document = _document(spec.name, mode, parameter_set, inputs, result)
     status = Status(result.status)
+    if status is Status.BAD_INPUT:
+        columns = as_columns(inputs, 1)
+        radius = np.array([result.near_field.expanded_hole_radius])
+        require_possible(expanded_hole_faults(columns, radius))
     if status is not Status.OK:
         message = f"{spec.name}: the simulation failed ({status.name}): {status.meaning}"
         raise SimulationError(message)
