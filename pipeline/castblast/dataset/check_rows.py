@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from castblast.dataset.schema import HISTORIES, plausible_range
+from castblast.dataset.schema import HISTORIES, plausible_range, role_of
 from castblast.errors import Status
 from castblast.variables import INPUT_NAMES, OUTPUT_NAMES, VARIABLES
 
@@ -55,18 +55,20 @@ class RowCheck:
     def add(self, block: xr.Dataset) -> None:
         """Check the next rows."""
         for name in ("explosive", "split", "status"):
-            if name in block.variables:
+            if name in block.variables and block[name].dtype.kind in "iu":
                 met = np.unique(block[name].to_numpy()).tolist()
                 self.codes.setdefault(name, set()).update(met)
         if "status" in block.variables:
             self.failed += int(np.count_nonzero(block["status"].to_numpy()))
         if "sample" in block.variables:
-            self._ids.append(block["sample"].to_numpy())
+            ids = block["sample"].to_numpy()
+            if ids.ndim == 1 and ids.dtype.kind in "iu":
+                self._ids.append(ids)
         for name in (*INPUT_NAMES, *OUTPUT_NAMES):
             if name in block.variables:
                 self._add_variable(block, name)
         for name in HISTORIES:
-            if name in block.variables and block[name].ndim == 2:
+            if name in block.variables and block[name].ndim == 2 and block[name].dtype.kind == "f":
                 finite = np.isfinite(block[name].to_numpy()).all(axis=1)
                 ok = _finished(block, len(finite))
                 self._note(block, name, "not finite in finished samples", ok & ~finite)
@@ -89,7 +91,7 @@ class RowCheck:
     def _add_variable(self, block: xr.Dataset, name: str) -> None:
         """Finite and plausible where the row is finished, NaN where it failed."""
         variable = block[name]
-        dims = () if variable.attrs.get("role") == "fixed" else ("sample",)
+        dims = () if role_of(variable) == "fixed" else ("sample",)
         if variable.dims != dims or variable.dtype.kind != "f":
             return  # said already, of the form
         if not dims:
@@ -108,7 +110,8 @@ class RowCheck:
         what = f"implausible; allowed: {low:g} to {high:g} {VARIABLES[name].unit}"
         self._note(block, name, what, ok & finite & beyond, values)
         bounds = [variable.attrs.get(f"sampled_{end}") for end in ("lower", "upper")]
-        if None not in bounds and "sampled_as_ratio_of" not in variable.attrs:
+        numbers = all(isinstance(bound, int | float | np.number) for bound in bounds)
+        if numbers and "sampled_as_ratio_of" not in variable.attrs:
             outside = (values < bounds[0]) | (values > bounds[1])
             self._note(block, name, "outside the sampled range", outside, values)
 

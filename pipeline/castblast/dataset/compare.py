@@ -6,7 +6,6 @@ blocks of rows, so two long datasets are compared without being held.
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,7 +16,10 @@ from numpy.typing import NDArray
 from castblast.dataset.provenance import differences
 from castblast.dataset.schema import DESCRIPTORS
 from castblast.dataset.store import BLOCK_ROWS
+from castblast.errors import DatasetError, SpecError
+from castblast.names import printable
 from castblast.progress import ProgressCallback, silent
+from castblast.reading import parse_json
 
 _FORM = ("units", "role", "flag_meanings")
 #: Attributes that follow from others or are told in words of their own.
@@ -87,7 +89,17 @@ class Comparison:
 def compare(
     first: xr.Dataset, second: xr.Dataset, progress: ProgressCallback = silent
 ) -> Comparison:
-    """Compare two datasets, open or in memory."""
+    """Compare two datasets, open or in memory.
+
+    Raises
+    ------
+    DatasetError
+        One has no ids of its samples.
+    """
+    for dataset in (first, second):
+        if "sample" not in dataset.variables or dataset["sample"].dtype.kind not in "iu":
+            message = f"{printable(str(dataset.attrs.get('id', '?')))}: has no ids of its samples"
+            raise DatasetError(message)
     ids = [dataset["sample"].to_numpy() for dataset in (first, second)]
     common, left, right = np.intersect1d(ids[0], ids[1], return_indices=True)
     result = Comparison(
@@ -102,6 +114,8 @@ def compare(
     for number, name in enumerate(names):
         progress(number / len(names), f"comparing {name}")
         pair = first.variables[name], second.variables[name]
+        if any("sample" in variable.dims[1:] for variable in pair):
+            continue  # rows are not rows there: said already, of the form
         if any("sample" in variable.dims for variable in pair):
             found = _rows_difference(name, pair, (left, right), common)
         else:
@@ -131,10 +145,12 @@ def relative_difference(name: str, first: NDArray[Any], second: NDArray[Any]) ->
 def _making(first: dict[str, Any], second: dict[str, Any]) -> list[str]:
     try:
         made = [
-            json.loads(str(attributes.get("made_from", "{}"))) for attributes in (first, second)
+            parse_json(str(attributes.get("made_from", "{}"))) for attributes in (first, second)
         ]
-    except ValueError:
+    except SpecError:
         return ["made_from: is not JSON in one of the files"]
+    if not all(isinstance(entry, dict) for entry in made):
+        return ["made_from: is no group of entries in one of the files"]
     lines = differences(*made)
     for key in ("designs_drawn", "n_failed"):
         if first.get(key) != second.get(key):

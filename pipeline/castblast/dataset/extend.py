@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,13 +17,14 @@ from castblast.dataset.provenance import (
     ExplosiveSource,
     Parent,
     differences,
-    explosive_from_text,
     made_from,
+    stored_explosives,
 )
 from castblast.dataset.simulation import HISTORY_NAMES, BatchResult
 from castblast.dataset.store import reading_dataset, row_blocks
 from castblast.errors import CheckError, DatasetError, StaleResultError
 from castblast.progress import ProgressCallback, silent
+from castblast.reading import parse_json
 from castblast.specs.loading import make_spec, parse_yaml
 from castblast.specs.recipe import Recipe, RecipeSource
 from castblast.variables import INPUT_NAMES, OUTPUT_NAMES
@@ -113,11 +113,8 @@ def read_existing(path: Path, progress: ProgressCallback = silent) -> Existing:
         text = str(attributes["recipe"])
         where = f"{path}: recipe"
         recipe = make_spec(parse_yaml(text, where), Recipe, where)
-        explosives = tuple(
-            explosive_from_text(entry, f"{path}: {name}")
-            for name, entry in json.loads(attributes["explosive_specs"]).items()
-        )
-        parents = tuple(Parent(**entry) for entry in json.loads(attributes.get("extends", "[]")))
+        explosives = tuple(stored_explosives(attributes, str(path)).values())
+        parents = _parents(path, str(attributes.get("extends", "[]")))
         _require_same_making(path, attributes, made_from(recipe, explosives, parents))
         return Existing(
             path=path,
@@ -130,12 +127,16 @@ def read_existing(path: Path, progress: ProgressCallback = silent) -> Existing:
         )
 
 
+def _parents(path: Path, text: str) -> tuple[Parent, ...]:
+    try:
+        return tuple(Parent(**entry) for entry in parse_json(text))
+    except TypeError:
+        raise DatasetError(f"{path}: attribute extends does not name datasets") from None
+
+
 def _require_same_making(path: Path, attributes: dict[str, object], now: dict[str, object]) -> None:
     """Rows of one dataset come from one physics."""
-    try:
-        before = json.loads(str(attributes["made_from"]))
-    except ValueError:
-        raise DatasetError(f"{path}: attribute made_from is not JSON") from None
+    before = parse_json(str(attributes["made_from"]), f"{path}: attribute made_from: ")
     changes = differences(before, now)
     if changes:
         lines = "\n".join(f"  {line}" for line in changes)

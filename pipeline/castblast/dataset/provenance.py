@@ -19,8 +19,10 @@ from typing import Any, NamedTuple
 
 from castblast import __version__
 from castblast.dataset.schema import SCHEMA, SCHEMA_VERSION
-from castblast.errors import SpecError
+from castblast.errors import DatasetError, SpecError
 from castblast.kernel import source_hash
+from castblast.names import printable
+from castblast.reading import parse_json
 from castblast.specs.catalogue import find_explosive
 from castblast.specs.explosive import ExplosiveSpec
 from castblast.specs.loading import make_spec, parse_yaml, read_yaml_text
@@ -97,6 +99,26 @@ def explosive_from_text(text: str, where: str) -> ExplosiveSource:
     """Read an explosive from the text of its file; what no flag may hold becomes underscores."""
     spec = make_spec(parse_yaml(text, where), ExplosiveSpec, where)
     return ExplosiveSource(re.sub(r"[^A-Za-z0-9.+_-]+", "_", spec.name).rstrip("_"), text, spec)
+
+
+def stored_explosives(attributes: Mapping[str, Any], where: str) -> dict[str, ExplosiveSource]:
+    """Read the explosives that a dataset carries, by the names of its flags.
+
+    Raises
+    ------
+    DatasetError
+        The attribute is missing or holds no texts.
+    SpecError
+        A text is no explosive of this version.
+    """
+    texts = parse_json(str(attributes.get("explosive_specs", "")), f"{where}: explosive_specs: ")
+    if not isinstance(texts, dict) or not all(isinstance(text, str) for text in texts.values()):
+        message = f"{where}: explosive_specs: texts of explosives by name are needed"
+        raise DatasetError(message)
+    return {
+        name: explosive_from_text(text, f"{where}: {printable(name)}")
+        for name, text in texts.items()
+    }
 
 
 def made_from(

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from castblast.errors import Status
+from castblast.errors import DatasetError, Status
 from castblast.specs.recipe import SPLIT_NAMES
 from castblast.variables import VARIABLES
 
@@ -113,14 +113,16 @@ def output_role(name: str) -> str:
 
 def flag_names(variable: xr.DataArray) -> NDArray[np.str_]:
     """Names of a column of codes, by its `flag_meanings`."""
-    meanings = np.array(str(variable.attrs["flag_meanings"]).split())
-    return np.asarray(meanings[variable.to_numpy()])
+    meanings, codes = _meanings(variable), variable.to_numpy()
+    _require_known(variable, codes, meanings)
+    return np.asarray(np.array(meanings)[codes])
 
 
 def flag_counts(variable: xr.DataArray) -> dict[str, int]:
     """How often each code of a column was met, by name in alphabetical order."""
-    meanings = str(variable.attrs["flag_meanings"]).split()
+    meanings = _meanings(variable)
     codes, counts = np.unique(variable.to_numpy(), return_counts=True)
+    _require_known(variable, codes, meanings)
     return dict(
         sorted((meanings[code], int(count)) for code, count in zip(codes, counts, strict=True))
     )
@@ -128,8 +130,26 @@ def flag_counts(variable: xr.DataArray) -> dict[str, int]:
 
 def flag_rows(variable: xr.DataArray, name: str) -> NDArray[np.bool_]:
     """Rows with the code of one name."""
-    meanings = str(variable.attrs["flag_meanings"]).split()
-    return np.asarray(variable.to_numpy() == meanings.index(name))
+    meanings = _meanings(variable)
+    code = meanings.index(name) if name in meanings else len(meanings)
+    return np.asarray(variable.to_numpy() == code)
+
+
+def _meanings(variable: xr.DataArray) -> list[str]:
+    return str(variable.attrs.get("flag_meanings", "")).split()
+
+
+def _require_known(variable: xr.DataArray, codes: NDArray[Any], meanings: list[str]) -> None:
+    """Refuse codes that no flag stands for.
+
+    Raises
+    ------
+    DatasetError
+        One line.
+    """
+    if codes.dtype.kind not in "iu" or np.any(codes < 0) or np.any(codes >= len(meanings)):
+        message = f"{variable.name}: holds codes that none of its {len(meanings)} flags stands for"
+        raise DatasetError(message)
 
 
 def names_with_role(dataset: xr.Dataset, role: str) -> tuple[str, ...]:
@@ -137,5 +157,11 @@ def names_with_role(dataset: xr.Dataset, role: str) -> tuple[str, ...]:
     return tuple(
         str(name)
         for name, variable in dataset.variables.items()
-        if variable.attrs.get("role") == role and name in VARIABLES
+        if role_of(variable) == role and name in VARIABLES
     )
+
+
+def role_of(variable: xr.Variable | xr.DataArray) -> str:
+    """Role of a column; an attribute of another kind is none."""
+    role = variable.attrs.get("role")
+    return role if isinstance(role, str) else ""

@@ -21,6 +21,7 @@ import xarray as xr
 from castblast.dataset.schema import SCHEMA, SCHEMA_VERSION
 from castblast.errors import DatasetError, OutputError
 from castblast.files import write_with
+from castblast.names import is_label, shortened
 
 #: Rows of a chunk of the file: what has to be read for one sample.
 CHUNK_ROWS = 4096
@@ -219,14 +220,21 @@ def _define(file: Any, form: xr.Dataset, rows: int) -> None:
 
 def _require_format(dataset: xr.Dataset, path: Path) -> None:
     kind = dataset.attrs.get("schema")
-    if kind != SCHEMA:
-        what = f"is a '{kind}'" if kind else "is netCDF, but not written by castblast"
+    if not isinstance(kind, str) or kind != SCHEMA:
+        other = "is netCDF, but not written by castblast"
+        what = other if kind is None else f"is a '{shortened(kind)}'"
         message = f"{path}: {what}; a {SCHEMA} is needed"
         raise DatasetError(message)
     version = str(dataset.attrs.get("schema_version", ""))
     if version.split(".")[0] != SCHEMA_VERSION.split(".")[0]:
-        message = f"{path}: has format {version}; this castblast reads {SCHEMA_VERSION}"
+        message = f"{path}: has format {shortened(version)}; this castblast reads {SCHEMA_VERSION}"
         raise DatasetError(message)
+    for key in ("name", "dataset_version", "content_sha256", "castblast_version"):
+        # They go into every model that is trained on it, and from there into source code.
+        if not is_label(dataset.attrs.get(key, "none")):
+            shown = shortened(dataset.attrs[key])
+            message = f"{path}: attribute {key}: '{shown}' is no plain text"
+            raise DatasetError(message)
 
 
 def _require_netcdf(path: Path) -> None:

@@ -18,6 +18,7 @@ from castblast.dataset.store import reading
 from castblast.errors import DatasetError, SpecError, StaleResultError
 from castblast.files import require_writable, write_text
 from castblast.locks import only_writer
+from castblast.reading import parse_json, read_json
 
 _NOTE = "made_from.json"
 
@@ -64,8 +65,8 @@ def is_finished(path: Path, origin: Mapping[str, Any]) -> bool:
         path.replace(path.with_suffix(".nc.cut"))
         return False
     try:
-        old = json.loads(attributes["made_from"])
-    except (KeyError, ValueError):
+        old = parse_json(str(attributes["made_from"]))
+    except (KeyError, SpecError):
         message = f"{path}: is not a dataset of castblast; choose another name with --out"
         raise SpecError(message) from None
     if old != origin:
@@ -104,8 +105,8 @@ def close_work_folder(path: Path) -> None:
 def _read_note(path: Path) -> dict[str, Any]:
     """Read what the shards were made from; empty if that cannot be read (shards tell as well)."""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        content = read_json(path)
+    except SpecError:
         return {}
     return content if isinstance(content, dict) else {}
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,12 +13,14 @@ from castblast.dataset.card import training_statistics
 from castblast.dataset.check import check
 from castblast.dataset.compare import relative_difference
 from castblast.dataset.failures import summary
-from castblast.dataset.provenance import SOURCES, explosive_from_text
+from castblast.dataset.form import require_form
+from castblast.dataset.provenance import SOURCES, stored_explosives
 from castblast.dataset.schema import flag_counts, flag_names, names_with_role
 from castblast.dataset.simulation import blast_simulator
 from castblast.dataset.store import reading_dataset
-from castblast.errors import SpecError, Status
+from castblast.errors import DatasetError, SpecError, Status
 from castblast.kernel import source_hash
+from castblast.names import printable
 from castblast.progress import ProgressCallback, silent
 from castblast.specs.recipe import recipe_from_text
 from castblast.variables import INPUT_NAMES, OUTPUT_NAMES, VARIABLES
@@ -69,6 +70,7 @@ def describe_dataset(path: Path) -> Description:
         The file cannot be read as a dataset.
     """
     with reading_dataset(path) as dataset:
+        require_form(dataset, path)
         return _describe(dataset, path)
 
 
@@ -132,13 +134,17 @@ def reproduce_sample(path: Path, sample: int) -> Reproduction:
         No such sample, or a recipe that this version cannot read.
     """
     with reading_dataset(path) as dataset:
+        require_form(dataset, path)
         position = _position(dataset, sample, path)
         wanted = ["explosive", "status", *INPUT_NAMES, *OUTPUT_NAMES]
         stored = dataset[wanted].isel(sample=position).load()
     recipe = recipe_from_text(stored.attrs["recipe"], f"{path}: recipe")
-    texts = json.loads(stored.attrs["explosive_specs"])
     name = str(flag_names(stored["explosive"]))
-    explosive = explosive_from_text(texts[name], f"{path}: {name}").spec.to_explosive()
+    carried = stored_explosives(stored.attrs, str(path))
+    if name not in carried:
+        message = f"{path}: carries no file of the explosive '{printable(name)}'"
+        raise DatasetError(message)
+    explosive = carried[name].spec.to_explosive()
     inputs = {key: np.array([float(stored[key])]) for key in INPUT_NAMES}
     result = blast_simulator(recipe, (explosive,)).run(inputs, np.zeros(1, dtype=np.int8))
     values = {key: (float(stored[key]), float(result.outputs[key][0])) for key in OUTPUT_NAMES}
@@ -147,6 +153,7 @@ def reproduce_sample(path: Path, sample: int) -> Reproduction:
         for key, pair in values.items()
     }
     worst = max(deviations, key=lambda key: deviations[key])
+    flag_names(stored["status"])  # a code that is none is refused
     statuses = (Status(int(stored["status"])), Status(int(result.status[0])))
     same = statuses[0] == statuses[1] and deviations[worst] <= SAME
     verdict = f"sample {sample}: " + _verdict(same, statuses, worst, deviations[worst])
@@ -172,7 +179,8 @@ def _position(dataset: xr.Dataset, sample: int, path: Path) -> int:
     ids = dataset["sample"].to_numpy()
     found = np.flatnonzero(ids == sample)
     if not len(found):
-        message = f"{path}: no sample {sample}; ids are {ids.min()} to {ids.max()}"
+        known = f"ids are {ids.min()} to {ids.max()}" if len(ids) else "it has none"
+        message = f"{path}: no sample {sample}; {known}"
         raise SpecError(message)
     return int(found[0])
 

@@ -8,7 +8,6 @@ can be held against the physics at places that are in no dataset.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
@@ -16,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.dataset.provenance import explosive_from_text
+from castblast.dataset.provenance import stored_explosives
 from castblast.dataset.simulation import Simulator, blast_simulator
 from castblast.errors import DatasetError
 from castblast.network import Floats
@@ -225,13 +224,10 @@ def dataset_domain(dataset: xr.Dataset, where: str = "dataset") -> Domain:
         message = f"{where}: carries no {' and no '.join(missing)}, so its domain is not known"
         raise DatasetError(message)
     recipe = recipe_from_text(str(dataset.attrs["recipe"]), f"{where}: recipe")
-    texts: Mapping[str, str] = json.loads(dataset.attrs["explosive_specs"])
-    explosives = tuple(
-        explosive_from_text(text, f"{where}: {name}").spec.to_explosive()
-        for name, text in texts.items()
-    )
+    stored = stored_explosives(dataset.attrs, where)
+    explosives = tuple(entry.spec.to_explosive() for entry in stored.values())
     energy = np.array([entry.density * entry.heat_of_explosion for entry in explosives])
-    return Domain(recipe, blast_simulator(recipe, explosives), tuple(texts), energy)
+    return Domain(recipe, blast_simulator(recipe, explosives), tuple(stored), energy)
 
 
 def _quantiles(spec: VariableSpec, shares: Floats) -> Floats:
