@@ -1951,10 +1951,10 @@ int castblast_explosive(const char *name) {
 /* One value and its bands; below zero the ends of the prediction band change places. */
 static void set_bands(castblast_prediction *answer, int j, double value) {
   const double half = fabs(value) * network_bands[j];
-  const int turned = value < 0.0;
+  const double one = value * prediction_bands[j][0], other = value * prediction_bands[j][1];
   answer->value[j] = value;
-  answer->prediction_lower[j] = value * prediction_bands[j][turned];
-  answer->prediction_upper[j] = value * prediction_bands[j][!turned];
+  answer->prediction_lower[j] = one < other ? one : other;
+  answer->prediction_upper[j] = one < other ? other : one;
   answer->network_lower[j] = value - half;
   answer->network_upper[j] = value + half;
 }

@@ -1173,7 +1173,7 @@ DOMAINS = ("inside", "unusual", "outside")
 NAN = float("nan")
 # What the prediction bands rest on.
 BASIS = NETWORK["basis"]
-_BANDS = [(column["prediction_band"] or (NAN, NAN), column["network_band"])
+_BANDS = [(tuple(column["prediction_band"] or (NAN, NAN)), column["network_band"])
           for column in NETWORK["outputs"]]
 
 
@@ -1348,6 +1348,11 @@ def predict(explosive, **inputs):
 def _named(bands):
     return {name: {"lower": lower, "upper": upper} for name, (lower, upper) in bands}
 
+
+# What a burden velocity is worth, for logs and input files.
+VELOCITY_NOTE = "prediction band, {:.2f} to {:.2f} times each velocity: 5th to 95th percentile of blasts; {}".format(
+    *(_BANDS[OUTPUTS.index("burden_velocity")][0] + (BASIS,))
+)
 
 # A bench of blocks: a CSV file with one line per block, columns `group`, `explosive`,
 # `direction_x`, `direction_y`, `direction_z` (any length), and every input in SI.

@@ -2,7 +2,7 @@
 
 Inputs are a mapping of the names of `castblast.variables` to SI values, in columns, one value per
 blast. `castblast.design` completes and refuses them; added here are what a prediction does not
-know: the calibrated set of the burden model, and the rise time, which depends on the explosive.
+know: the parameter set of the burden model, and the rise time, which depends on the explosive.
 """
 
 from __future__ import annotations

@@ -116,7 +116,7 @@ INPUTS: tuple[Variable, ...] = (
        "stemming length; default: 0.7 burden, or bench height less charge length", None, "L_s"),
     _v("charge_length", "m", "bench", 0.05, 100.0,
        "charge length; default: bench height less stemming length", None, "L_c"),
-    # burden-motion model: calibrated, not validated
+    # burden-motion model: checked against a published system, not calibrated on blasts
     _v("pressurised_width_ratio", "1", "burden_model", 0.01, 1.0,
        "burden displacement over mean burden at which the gas fills the break-out plane", 0.10,
        "xi_p"),
@@ -228,7 +228,8 @@ OUTPUT_NAMES: tuple[str, ...] = tuple(v.name for v in OUTPUTS)
 STEMMING_RATIO = 0.7
 
 #: Named parameter sets of the burden-motion model. `authors` reproduces the level of the published
-#: web tool of Furtney et al.; `field` is anchored on measured gas-front speeds. Both calibrated.
+#: web tool of Furtney et al.; `field` starts from measured gas-front speeds. Neither is calibrated
+#: on measured blasts.
 BURDEN_PARAMETER_SETS: dict[str, dict[str, float]] = {
     "authors": {"gas_front_velocity": 1300.0, "fracture_storage_ratio": 1.5},
     "field": {"gas_front_velocity": 240.0, "fracture_storage_ratio": 1.0},

@@ -391,7 +391,8 @@ class ball:
     rows = list(csv.DictReader(files["bench.csv"].decode().splitlines()))
     numeric = np.array([[float(row[name]) for name in network.input_names] for row in rows])
     truth = answers(network, numeric, np.zeros(2, dtype=np.int64)).values[:, 0]
-    speeds = [float(line.split()[1]) for line in lines[:-2]]
+    assert BASIS in lines[0]
+    speeds = [float(line.split()[1]) for line in lines[1:-2]]
     np.testing.assert_allclose(speeds, truth[[0, 1, 1]], rtol=1e-12)
     written_in = re.findall(rb"velocity-x (\S+)", files["pfc_bench.dat"])
     np.testing.assert_allclose([float(speed) for speed in written_in], truth, rtol=1e-12)

@@ -43,7 +43,7 @@ def simulate(
     ] = None,
     parameter_set: Annotated[
         _ParameterSet | None,
-        typer.Option(help="Calibration of the burden model.", show_default="authors"),
+        typer.Option(help="Parameter set of the burden model.", show_default="authors"),
     ] = None,
     settings: Settings = None,
     allow_inconsistent: Annotated[

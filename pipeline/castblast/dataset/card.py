@@ -25,8 +25,8 @@ _INTENDED = (
 _LIMITS = (
     "Every number is the output of a model, none is a measurement. The near field is "
     "one-dimensional, the rock rate-independent and unjointed; the parameters of the burden motion "
-    "are calibrated, not validated. Do not use the data outside the ranges below, nor in place of "
-    "a blast design by a competent person."
+    "are checked against a published system, not calibrated on blasts and not validated. Do not "
+    "use the data outside the ranges below, nor in place of a blast design by a competent person."
 )
 _UPKEEP = (
     "The file carries its recipe and its explosives; `castblast dataset reproduce` recomputes any "

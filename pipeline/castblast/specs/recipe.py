@@ -251,7 +251,7 @@ class Recipe(Spec):
     constraints : Constraints
     solver : SolverSpec
     burden_parameter_set : {"authors", "field"}
-        Calibration of the burden model.
+        Of the burden model; neither is calibrated on measured blasts.
     split : SplitShares
     max_failed_share : float
         A build with a larger share of failed samples is refused.
