@@ -72,7 +72,7 @@ def _same(folder: Path) -> dict[str, bytes]:
     return {
         name: content
         for name, content in _bytes(folder).items()
-        if not name.endswith(("timings.json", "report.html", "dataset.txt"))
+        if not name.endswith(("timings.json", "timings.html", "dataset.txt"))
     }
 
 
@@ -94,6 +94,8 @@ def test_a_comparison_leaves_league_curves_and_page(comparison: Path) -> None:
     for name in MODELS:
         assert name in page
     assert "fit_seconds" in (comparison / "timings.json").read_text()
+    assert "fit [s]" in (comparison / "timings.html").read_text(encoding="utf-8")
+    assert "[s]" not in page, "what is hashed holds no time"
 
 
 def test_tracking_changes_no_byte(source, comparison: Path, tmp_path: Path) -> None:

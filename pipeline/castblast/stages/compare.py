@@ -1,8 +1,8 @@
 """The whole comparison of models on one dataset: fits, gate, league, curves, shifts, indices.
 
 What takes long is kept in the cache of the user (`castblast.surrogate.kept`), so that a comparison
-which was stopped goes on and a second one only writes. ``comparison.json`` and all pictures are a
-function of dataset, specs and code; times are in ``timings.json``.
+which was stopped goes on and a second one only writes. ``comparison.json``, page and pictures are
+a function of dataset, specs and code; times are in ``timings.json`` and ``timings.html``.
 """
 
 from __future__ import annotations

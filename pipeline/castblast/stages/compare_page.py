@@ -26,23 +26,21 @@ _CAPTIONS = {
 }
 
 
-def write_page(path: Path, document: Document, costs: Document, files: Sequence[Path]) -> Path:
-    """Render a comparison.
+def write_page(path: Path, document: Document, files: Sequence[Path]) -> Path:
+    """Render a comparison; the same document and pictures give the same page.
 
     Parameters
     ----------
     path : path
     document : mapping
         As in ``comparison.json``.
-    costs : mapping
-        From `surrogate.timing.timings`.
     files : sequence of path
         Those already written; the pictures among them are shown.
     """
     pictures = [file for file in files if file.suffix == ".png"]
     source = document["dataset"]
     sections = [
-        _league(document, costs, pictures),
+        _league(document, pictures),
         _marks(document),
         _gate(document, pictures),
         _learning(document, pictures),
@@ -68,13 +66,38 @@ _LIMITS = (
     "The choice is made on validation rows; test rows are only reported.",
     "Two models that the test rows cannot tell apart are named as such: the order between them "
     "is luck.",
-    "Times were taken on the machine that made this page.",
+    "What the models cost is in timings.html: no two measurements of time are the same.",
 )
 
 
-def _league(document: Document, costs: Document, pictures: Sequence[Path]) -> Section:
+def write_costs(path: Path, document: Document, costs: Document) -> Path:
+    """Render what the models cost, on a page of its own as it never comes out the same twice.
+
+    Parameters
+    ----------
+    path : path
+    document : mapping
+        As in ``comparison.json``.
+    costs : mapping
+        From `surrogate.timing.timings`.
+    """
+    kinds = ("fit_seconds", "row", "batch", "network_row", "network_batch")
+    rows = [
+        [entry["name"], *(_number(costs.get(entry["name"], {}).get(kind)) for kind in kinds)]
+        for entry in document["league"]
+    ]
+    header = ("model", "fit [s]", "one row [µs]", "batch, a row [µs]",
+              "exported, one row [µs]", "exported, batch, a row [µs]")  # fmt: skip
+    table = Table(header, rows, "On one thread of the machine that made this page")
+    lead = "Times to fit each model of the comparison and to ask it."
+    return write_report(
+        path, "castblast: what the models cost", lead, [Section("Times", tables=[table])]
+    )
+
+
+def _league(document: Document, pictures: Sequence[Path]) -> Section:
     targets = document["targets"]
-    errors, squares, prices = [], [], []
+    errors, squares = [], []
     for entry in document["league"]:
         name = entry["name"] + (" (chosen)" if entry["name"] == document["chosen"] else "")
         figures = [entry["targets"][target] for target in targets]
@@ -82,17 +105,8 @@ def _league(document: Document, costs: Document, pictures: Sequence[Path]) -> Se
         first = "no" if entry["distinguishable_from_first"] else "yes"
         export = "yes" if entry["exportable"] else "no"
         errors.append([name, gate, export, first, *map(_error, figures)])
-        squares.append([name, *(show_r_squared(figure["r2"]) for figure in figures)])
-        cost = costs.get(entry["name"], {})
-        prices.append(
-            [
-                name,
-                "-" if entry["parameters"] is None else f"{entry['parameters']:,}",
-                _number(cost.get("fit_seconds")),
-                *(_number(cost.get(key)) for key in ("row", "batch")),
-                *(_number(cost.get(f"network_{key}")) for key in ("row", "batch")),
-            ]
-        )
+        weights = "-" if entry["parameters"] is None else f"{entry['parameters']:,}"
+        squares.append([name, weights, *(show_r_squared(figure["r2"]) for figure in figures)])
     words = [_words(name) for name in targets]
     paper = document["paper"]
     caption = (
@@ -102,13 +116,8 @@ def _league(document: Document, costs: Document, pictures: Sequence[Path]) -> Se
     )
     tables = [
         Table(("model", "gate", "export", "level with the first", *words), errors, caption),
-        Table(("model", *words), squares, "R², cut to five places"),
-        Table(
-            ("model", "weights", "fit [s]", "one row [µs]", "batch, a row [µs]",
-             "exported, one row [µs]", "exported, batch, a row [µs]"),
-            prices, "Costs on this machine",
-        ),
-    ]  # fmt: skip
+        Table(("model", "weights", *words), squares, "R², cut to five places"),
+    ]
     chosen = document["chosen"] or "none: no model that can be exported passes the gate"
     paragraphs = [f"Chosen: {chosen} ({document['rule']})."]
     if document["gap"] > 1.0:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from castblast.files import write_csv, write_text
-from castblast.stages.compare_page import write_page
+from castblast.stages.compare_page import write_costs, write_page
 from castblast.stages.fitting import fit_title, held_out, write_json
 from castblast.stages.train import TrainOutcome, show_r_squared, show_share
 
@@ -45,8 +45,9 @@ def write_comparison(
         files.append(write_text(network, to_json(found.chosen.network)))
     else:
         network.unlink(missing_ok=True)
+    files.append(write_page(out / "report.html", document, files))
     costs = timings(found.fits)
-    files.append(write_page(out / "report.html", document, costs, files))
+    files.append(write_costs(out / "timings.html", document, costs))
     times = {"models": costs, "parts": dict(found.times), "comparison_seconds": seconds}
     files.append(write_json(out / "timings.json", times))
     return files

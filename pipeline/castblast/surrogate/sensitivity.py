@@ -266,7 +266,7 @@ def _analyze(a: Floats, ab: Floats, b: Floats, seed: int) -> dict[str, float]:
         calc_second_order=False,
         num_resamples=_RESAMPLES,
         conf_level=0.95,
-        seed=seed,
+        seed=1 + seed,  # SALib takes a seed of 0 for none
     )
     return {key: float(result[key][0]) for key in ("S1", "S1_conf", "ST", "ST_conf")}
 
