@@ -96,7 +96,7 @@ def test_a_study_in_parts_is_the_study_in_one_go(whole, spec, table, tmp_path: P
 
 
 def test_a_killed_study_goes_on(whole, folder: Path, tmp_path: Path) -> None:
-    """SIGKILL in a running trial: it is closed as interrupted and its settings tried again."""
+    """SIGKILL in a running trial: its settings are tried again, and no byte tells of the kill."""
     arguments = [folder / "toy.nc", folder / "tiny.yaml", tmp_path]
     process = subprocess.Popen(
         [sys.executable, "-c", DYING, *map(str, arguments)], stdout=subprocess.PIPE, text=True
@@ -113,9 +113,35 @@ def test_a_killed_study_goes_on(whole, folder: Path, tmp_path: Path) -> None:
     begun = time.monotonic()
     outcome = tune_stage(folder / "toy.nc", folder / "tiny.yaml", trials=TRIALS, out=tmp_path)
     assert time.monotonic() - begun < 20, "the lock of the dead process was waited for"
-    assert [trial["state"] for trial in outcome.document["trials"]].count("interrupted") == 1
-    assert outcome.document["trials"][3]["state"] == "interrupted"
-    assert _finished(outcome.document) == _finished(whole[0].document)
+    assert any("1 interrupted and tried again" in line for line in outcome.lines)
+    for name in ("study.json", "tiny_tuned.yaml", "importance.png"):
+        assert (tmp_path / name).read_bytes() == (whole[1] / name).read_bytes(), name
+
+
+@pytest.mark.parametrize("place", ["before it begins", "in its fit"])
+def test_a_study_killed_in_its_first_trial_still_begins_with_the_spec_itself(
+    spec, table, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str
+) -> None:
+    """Its own settings were put in the queue by then, and stood in the journal as tried."""
+    import optuna
+
+    inside = spec.model_copy(update={"penalty": 1e-6})
+
+    def die(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        if place == "in its fit":
+            patch.setattr(tuning, "fit_spec", die)
+        else:
+            patch.setattr(optuna.study.Study, "ask", die)
+        with pytest.raises(KeyboardInterrupt):
+            tuning.tune(inside, table, tmp_path / "killed.journal", trials=3)
+    found = tuning.tune(inside, table, tmp_path / "killed.journal", trials=3)
+    whole = tuning.tune(inside, table, tmp_path / "whole.journal", trials=3)
+    assert found.trials[0].settings["penalty"] == 1e-6
+    assert found.trials == whole.trials
+    assert found.interrupted == (1 if place == "in its fit" else 0)
 
 
 def test_the_best_spec_is_a_complete_spec(whole, spec, table) -> None:

@@ -172,8 +172,9 @@ def _outcome(result: StudyResult, folder: Path, journal: Path) -> TrainOutcome:
     ]
     counts = {
         state: sum(trial.state == state for trial in result.trials)
-        for state in ("complete", "pruned", "failed", "interrupted")
+        for state in ("complete", "pruned", "failed")
     }
+    counts["interrupted and tried again"] = result.interrupted
     told = ", ".join(f"{count} {state}" for state, count in counts.items() if count)
     lines = [f"* best, the smallest of those within 1 % of the lowest error; trials: {told}"]
     remarks = list(dict.fromkeys(trial.remark for trial in result.trials if trial.remark))

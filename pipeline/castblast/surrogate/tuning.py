@@ -28,7 +28,7 @@ from castblast.surrogate.study_file import hold_study
 from castblast.surrogate.training import fit_spec
 from castblast.surrogate.tuning_space import candidate, own_parameters, suggest
 
-State = Literal["complete", "pruned", "failed", "interrupted"]
+State = Literal["complete", "pruned", "failed"]
 #: Errors this close to the lowest (ratio) count as equal; the smaller model is the better one.
 TIE = 1.01
 _STARTUP = 10
@@ -37,14 +37,14 @@ _STUDY = "castblast"
 
 @dataclass(frozen=True)
 class TrialRecord:
-    """One trial of a study.
+    """One trial that came to its end.
 
     Attributes
     ----------
     number : int
-    state : {"complete", "pruned", "failed", "interrupted"}
-        "failed": the settings could not be fitted; "interrupted": the process died in it, and its
-        settings were tried again.
+        Among those that did: one in which the process died was tried again and leaves no trace.
+    state : {"complete", "pruned", "failed"}
+        "failed": the settings could not be fitted.
     error : float or None
         Geometric mean over the targets of the 95 % relative error on validation rows.
     parameters : int or None
@@ -74,6 +74,8 @@ class StudyResult:
     best : TrialRecord
     trials : tuple of TrialRecord
         By number.
+    interrupted : int
+        Trials in which the process died, each of which was tried again.
     importance : mapping of field to float
         Share of the field in the spread of the error (sums to 1); empty below four trials.
     identity : mapping
@@ -83,6 +85,7 @@ class StudyResult:
     spec: ModelSpec
     best: TrialRecord
     trials: tuple[TrialRecord, ...]
+    interrupted: int
     importance: Mapping[str, float]
     identity: Mapping[str, str]
 
@@ -272,15 +275,15 @@ def _run_trials(
 
 def _count_finished(study: Any) -> int:
     """Trials that were told about, by their own process."""
-    return sum(_state(trial) in ("complete", "pruned", "failed") for trial in study.trials)
+    return sum(_state(trial) is not None for trial in study.trials)
 
 
 def _state(trial: Any) -> State | None:
-    name = trial.state.name
-    if name == "FAIL":
-        return "failed" if "fault" in trial.user_attrs else "interrupted"
+    """How a trial ended; None for one in which the process died, or that still waits."""
+    if trial.state.name == "FAIL":
+        return "failed" if "fault" in trial.user_attrs else None
     known: dict[str, State] = {"COMPLETE": "complete", "PRUNED": "pruned"}
-    return known.get(name)
+    return known.get(trial.state.name)
 
 
 def _is_complete(trial: Any) -> bool:
@@ -295,9 +298,7 @@ def _run_trial(optuna: Any, study: Any, search: _Search, index: int) -> None:
     )  # fmt: skip
     study.pruner = optuna.pruners.MedianPruner(n_startup_trials=_STARTUP // 2, n_warmup_steps=3)
     if index == 0:
-        own = own_parameters(search.spec, search.space)
-        if own is not None:
-            study.enqueue_trial(own, skip_if_exists=True)
+        _begin_with(optuna, study, own_parameters(search.spec, search.space))
     trial = study.ask()
     settings = suggest(trial, search.space)
     trial.set_user_attr("settings", settings)
@@ -320,6 +321,16 @@ def _run_trial(optuna: Any, study: Any, search: _Search, index: int) -> None:
         study.tell(trial, fit.restart.valid_error)
 
 
+def _begin_with(optuna: Any, study: Any, own: Mapping[str, Any] | None) -> None:
+    """Have the settings of the spec itself tried next, unless a killed process saw to that.
+
+    One that was killed while it tried them has left a trial that failed: they are tried again.
+    """
+    waiting = study.get_trials(deepcopy=False, states=(optuna.trial.TrialState.WAITING,))
+    if own is not None and not waiting:
+        study.enqueue_trial(dict(own))
+
+
 def _reporter(optuna: Any, trial: Any) -> Callable[[float], None]:
     """Callback for the validation error on the way; it stops a fit that lags behind."""
     steps = count()
@@ -333,7 +344,8 @@ def _reporter(optuna: Any, trial: Any) -> Callable[[float], None]:
 
 
 def _result(optuna: Any, study: Any, spec: ModelSpec, identity: Mapping[str, str]) -> StudyResult:
-    records = tuple(_record(trial) for trial in study.trials if _state(trial) is not None)
+    ended = [trial for trial in study.trials if _state(trial) is not None]
+    records = tuple(_record(number, trial) for number, trial in enumerate(ended))
     best = best_trial(records)
     if best is None:
         remarks = [record.remark for record in records if record.remark]
@@ -341,15 +353,16 @@ def _result(optuna: Any, study: Any, spec: ModelSpec, identity: Mapping[str, str
         message = f"{spec.name}: {what}"
         raise SpecError(message)
     tuned = candidate(spec, best.settings, f"{spec.name}_tuned")
-    return StudyResult(tuned, best, records, _importance(optuna, study), identity)
+    dead = sum(trial.state.name == "FAIL" for trial in study.trials if _state(trial) is None)
+    return StudyResult(tuned, best, records, dead, _importance(optuna, study), identity)
 
 
-def _record(trial: Any) -> TrialRecord:
+def _record(number: int, trial: Any) -> TrialRecord:
     state = _state(trial)
     assert state is not None
     attributes = trial.user_attrs
     return TrialRecord(
-        number=trial.number,
+        number=number,
         state=state,
         error=trial.value if state == "complete" else None,
         parameters=attributes.get("parameters"),
