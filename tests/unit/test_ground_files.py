@@ -12,22 +12,17 @@ from castblast.errors import SpecError
 from castblast.muckpile.particles import particles_at_rest
 from castblast.muckpile.terrain import heightmap, surface_faults, wall_faults
 from castblast.muckpile.walls import floor, ground_height, join, slope, surface
-from castblast.specs.ground import (
-    GroundSpec,
-    one_or_many,
-    read_ground,
-    read_heights,
-    read_stl,
-    smooth_heights,
-)
+from castblast.specs.ground import GroundSpec, one_or_many, read_ground, smooth_heights
+from castblast.specs.ground_heights import Heights, read_heights
 from castblast.specs.loading import make_spec
+from castblast.specs.stl_file import load_stl
 
 X, Y = np.array([0.0, 1.0, 2.0, 3.0]), np.array([10.0, 11.0, 12.0])
 HEIGHT = np.arange(12.0).reshape(3, 4) ** 2 / 50.0
 
 
-def same(found):
-    for got, given in zip(found, (X, Y, HEIGHT), strict=True):
+def same(found: Heights):
+    for got, given in zip(found[:3], (X, Y, HEIGHT), strict=True):
         np.testing.assert_allclose(got, given, atol=1e-12)
 
 
@@ -82,7 +77,7 @@ def test_faults_of_heights_are_named_by_row_and_column(tmp_path):
     with pytest.raises(SpecError, match="row 0, column 1"):
         read_heights(tmp_path / "g.asc")
     (tmp_path / "g.asc").write_text(header + "1 2\n3\n")
-    with pytest.raises(SpecError, match="3 heights"):
+    with pytest.raises(SpecError, match="3 heights; nrows x ncols"):
         read_heights(tmp_path / "g.asc")
     np.savez(tmp_path / "k.npz", x=X, y=Y, heigth=HEIGHT)
     with pytest.raises(SpecError, match="height"):
@@ -123,21 +118,55 @@ def test_stl_files_are_read_and_refused(tmp_path):
     corner = sheet()
     mesh = trimesh.Trimesh(corner.reshape(-1, 3), np.arange(len(corner) * 3).reshape(-1, 3))
     mesh.export(tmp_path / "sheet.stl")
-    np.testing.assert_allclose(read_stl(tmp_path / "sheet.stl"), corner, atol=1e-6)
-    (tmp_path / "bad.stl").write_bytes(b"solid nothing\n")
-    for name in ("bad.stl", "gone.stl"):
-        with pytest.raises(SpecError, match=name):
-            read_stl(tmp_path / name)
+    found = load_stl(tmp_path / "sheet.stl")
+    assert found.single
+    np.testing.assert_allclose(found.corner, corner, atol=1e-6)
     holed = np.delete(corner, 10, axis=0)
     mesh = trimesh.Trimesh(holed.reshape(-1, 3), np.arange(len(holed) * 3).reshape(-1, 3))
     mesh.export(tmp_path / "holed.stl")
     with pytest.raises(SpecError, match="hole"):
-        read_stl(tmp_path / "holed.stl")
-    walls = read_ground(
-        (make_spec({"stl": "sheet.stl", "shift": ["0 m", "0 m", "2 m"]}, GroundSpec, "b"),),
-        tmp_path,
-    )
+        read_ground((make_spec({"stl": "holed.stl"}, GroundSpec, "b"),), tmp_path)
+    spec = make_spec({"stl": "sheet.stl", "shift": ["0 m", "0 m", "2 m"]}, GroundSpec, "b")
+    walls = read_ground((spec,), tmp_path).walls
     assert ground_height(walls, np.array([1.3]), np.array([2.2]))[0] == pytest.approx(2.0)
+
+
+def test_damaged_stl_files_are_one_line(tmp_path):
+    """Cut off, of another length than stated, huge by its word, or no STL: one line each."""
+    trimesh = pytest.importorskip("trimesh")
+    corner = sheet()
+    mesh = trimesh.Trimesh(corner.reshape(-1, 3), np.arange(len(corner) * 3).reshape(-1, 3))
+    binary = mesh.export(file_type="stl")
+    text = mesh.export(file_type="stl_ascii").encode()
+    bad = np.frombuffer(binary, np.uint8).copy()
+    bad[84 + 12 : 84 + 16] = np.frombuffer(np.float32(np.nan).tobytes(), np.uint8)
+    cases = {
+        "short.stl": (binary[:-7], "stated take"),
+        "huge.stl": (binary[:80] + b"\xff\xff\xff\xff" + binary[84:], "4,294,967,295 facets"),
+        "nan.stl": (bad.tobytes(), "facet 0: a corner is not a number"),
+        "cut.stl": (text[: len(text) // 2], "is damaged: "),
+        "open.stl": (text[: text.rfind(b"endsolid")], ""),
+        "words.stl": (text.replace(b"vertex 1", b"vertex one", 1), ""),
+        "bad.stl": (b"solid nothing\n", ""),
+        "none.stl": (b"solid a\nendsolid a\n", "holds no facet"),
+        "empty.stl": (b"", "is no STL file: 0 bytes"),
+        "zip.stl": (b"PK" + bytes(200), "is no STL file"),
+    }
+    for name, (content, words) in cases.items():
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(SpecError) as caught:
+            load_stl(tmp_path / name)
+        line = str(caught.value)
+        assert line.startswith(f"{tmp_path / name}: "), line
+        assert words in line
+        assert "\n" not in line
+    with pytest.raises(SpecError, match=r"gone.stl: no such file"):
+        load_stl(tmp_path / "gone.stl")
+    # Solids one after the other, and decimal commas, are read whole.
+    (tmp_path / "two.stl").write_bytes(text + text)
+    np.testing.assert_allclose(load_stl(tmp_path / "two.stl").corner, np.tile(corner, (2, 1, 1)))
+    (tmp_path / "comma.stl").write_bytes(text.replace(b".", b","))
+    np.testing.assert_allclose(load_stl(tmp_path / "comma.stl").corner, corner, atol=1e-6)
 
 
 def test_ground_in_a_bench_file(tmp_path):
@@ -150,12 +179,12 @@ def test_ground_in_a_bench_file(tmp_path):
         GroundSpec,
         "bench.yaml",
     )
-    walls = read_ground((spec,), tmp_path)
+    walls = read_ground((spec,), tmp_path).walls
     assert ground_height(walls, np.array([4.0]), np.array([12.0]))[0] == HEIGHT[-1, -1] + 0.5
     assert (walls.facet_friction == 0.7).all()
     with pytest.raises(SpecError, match="exactly one"):
         make_spec({"heightmap": "a.npz", "stl": "b.stl"}, GroundSpec, "bench.yaml")
-    assert len(read_ground((), tmp_path).corner) == 0
+    assert len(read_ground((), tmp_path).walls.corner) == 0
 
 
 def test_heights_are_smoothed_and_extended(tmp_path):
@@ -177,7 +206,7 @@ def test_heights_are_smoothed_and_extended(tmp_path):
     assert spread == pytest.approx(1.0, rel=1e-3)
     np.savez(tmp_path / "pile.npz", x=X, y=Y, height=HEIGHT)
     names = {"heightmap": "pile.npz", "smooth": "1 m", "extend": "2 m"}
-    walls = read_ground((make_spec(names, GroundSpec, "bench.yaml"),), tmp_path)
+    walls = read_ground((make_spec(names, GroundSpec, "bench.yaml"),), tmp_path).walls
     assert walls.corner[..., 0].min() == X[0] - 2.0
     assert walls.corner[..., 1].max() == Y[-1] + 2.0
     with pytest.raises(SpecError, match="go with a heightmap"):

@@ -43,11 +43,11 @@ def test_sound_ground_keeps_every_bit():
 def test_ground_that_faces_down_is_turned():
     """All of it, or one facet: the surface of the sound one, the facets named."""
     good = sheet()
-    assert done(good[:, ::-1]) == {"turned face away from the balls": list(range(72))}
+    assert done(good[:, ::-1]) == {"turned faced away from the balls": list(range(72))}
     assert (facet_normals(mend(good[:, ::-1], WELD).corner)[:, 2] > 0.0).all()
     one = good.copy()
     one[20] = one[20, ::-1]
-    assert done(one) == {"turned face away from the balls": [20]}
+    assert done(one) == {"turned faced away from the balls": [20]}
     assert surface_faults(one) != []
 
 
@@ -55,12 +55,12 @@ def test_doubled_and_flat_facets_are_dropped():
     """A facet again, or turned; a needle along an edge; one with two corners at one place."""
     good = sheet()
     again = np.concatenate([good, good[[6]], good[[9]][:, ::-1]])
-    assert done(again) == {"dropped lie on another with the same corners": [72, 73]}
+    assert done(again) == {"dropped lay on another with the same corners": [72, 73]}
     a, b = good[0, 0], good[0, 1]
     needle = np.stack([a, b, 0.5 * (a + b) + [0.0, 0.0, 1e-5]])[None]
-    assert done(np.concatenate([good, needle])) == {"dropped have no height": [72]}
+    assert done(np.concatenate([good, needle])) == {"dropped had no height": [72]}
     point = np.stack([a, a, b])[None]
-    assert done(np.concatenate([point, good])) == {"dropped have no height": [0]}
+    assert done(np.concatenate([point, good])) == {"dropped had no height": [0]}
     mended = mend(np.concatenate([good, needle]), WELD)
     np.testing.assert_array_equal(mended.corner, good)
     np.testing.assert_array_equal(mended.source, np.arange(72))
@@ -91,7 +91,7 @@ def test_corners_a_fraction_of_a_millimetre_apart_are_joined():
     good = sheet()
     rng = np.random.default_rng(0)
     loose = good + rng.uniform(-2e-4, 2e-4, good.shape)
-    assert list(done(loose)) == ["joined have corners that lie beside others"]
+    assert list(done(loose)) == ["joined had corners just beside those of others"]
     joined = surface(loose).corner
     np.testing.assert_allclose(joined, good, atol=2e-4)
     assert len(np.unique(joined.reshape(-1, 3), axis=0)) == X.size * Y.size

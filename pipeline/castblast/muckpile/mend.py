@@ -34,9 +34,9 @@ class Repair(NamedTuple):
     Attributes
     ----------
     what : str
-        What was wrong, such as ``"have no height"``.
+        What was wrong, such as ``"had no height"``.
     done : str
-        What was done about it.
+        What was done about it: ``"dropped"``.
     facet : array (n,), int64
         Numbers in the file, rising.
     """
@@ -67,10 +67,11 @@ def weld_distance(corner: FloatArray) -> float:
 
     On an edge whose two facets do not share it a ball would meet both of them at once.
     """
-    return min(WELD, _WELD_SHARE * _median_side(corner)) if len(corner) else WELD
+    return min(WELD, _WELD_SHARE * median_side(corner)) if len(corner) else WELD
 
 
-def _median_side(corner: FloatArray) -> float:
+def median_side(corner: FloatArray) -> float:
+    """Median length [m] of the sides of facets (t, 3, 3) [m], t > 0."""
     return float(np.median(np.linalg.norm(corner - np.roll(corner, -1, axis=1), axis=2)))
 
 
@@ -119,19 +120,19 @@ def mend(corner: FloatArray, distance: float, towards: FloatArray | None = None)
     towards : array (3,), optional [m]
     """
     welded, moved = weld(corner, distance)
-    repairs = [Repair("have corners that lie beside others", "joined", np.flatnonzero(moved))]
+    repairs = [Repair("had corners just beside those of others", "joined", np.flatnonzero(moved))]
     source = np.arange(len(welded))
     welded, source, flat = _without_flat(welded, source, distance)
-    repairs.append(Repair("have no height", "dropped", flat))
+    repairs.append(Repair("had no height", "dropped", flat))
     number, _ = corner_numbers(welded)
     _, first = np.unique(np.sort(number, axis=1), axis=0, return_index=True)
     first = np.sort(first)
     doubled = np.delete(source, first)
-    repairs.append(Repair("lie on another with the same corners", "dropped", doubled))
+    repairs.append(Repair("lay on another with the same corners", "dropped", doubled))
     welded, source = welded[first], source[first]
     turned = _turned(welded, towards)
     welded[turned] = welded[turned][:, ::-1]
-    repairs.append(Repair("face away from the balls", "turned", np.unique(source[turned])))
+    repairs.append(Repair("faced away from the balls", "turned", np.unique(source[turned])))
     return Mended(welded, source, tuple(r for r in repairs if len(r.facet)))
 
 
@@ -281,7 +282,7 @@ def cracks(corner: FloatArray, distance: float) -> tuple[int, float]:
     place = np.empty((places, 3))
     place[number] = corner
     at_rim = np.unique(rim)
-    reach = min(_WIDEST_CRACK, _CRACK_SHARE * _median_side(corner))
+    reach = min(_WIDEST_CRACK, _CRACK_SHARE * median_side(corner))
     near = cKDTree(place[at_rim]).query_pairs(reach, output_type="ndarray")
     known = np.sort(ends, axis=1)
     pair = np.sort(at_rim[near], axis=1)

@@ -31,15 +31,8 @@ from castblast.muckpile.mend import weld, weld_distance
 from castblast.muckpile.particles import FloatArray
 
 __all__ = ["WallTable", "Walls", "bench_walls", "floor", "ground_height", "join", "near_walls"]
-__all__ += [
-    "plane",
-    "rectangle",
-    "slope",
-    "surface",
-    "wall_distance",
-    "wall_friction",
-    "wall_table",
-]
+__all__ += ["plane", "rectangle", "slope", "surface"]
+__all__ += ["wall_distance", "wall_friction", "wall_table"]
 
 #: How many radii behind a surface of facets a ball is still held: less than the thickness of any
 #: body over the radius, or the far side would pull it through.
@@ -156,9 +149,7 @@ def surface(
     base: float = -inf,
     welded: bool = False,
 ) -> Walls:
-    """Facets of one surface.
-
-    Corners closer together than `castblast.muckpile.mend.weld_distance` become one.
+    """Facets of one surface; corners within `castblast.muckpile.mend.weld_distance` become one.
 
     Parameters
     ----------

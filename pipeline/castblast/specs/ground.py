@@ -1,32 +1,40 @@
-"""Ground of a bench file: heights on a grid or an STL surface, read and checked before use."""
+"""Ground of a bench file: heights on a grid or an STL surface, read, mended and checked."""
 
 from __future__ import annotations
 
 import math
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
-from castblast.errors import SpecError, nearest_name
-from castblast.extras import require
+from castblast.errors import SpecError
+from castblast.muckpile.bench import Bench
+from castblast.muckpile.mend import Mended, Repair, cracks, median_side, mend, weld_distance
 from castblast.muckpile.particles import FloatArray
-from castblast.muckpile.terrain import height_faults, heightmap, surface_faults
+from castblast.muckpile.terrain import heightmap, named_facets, surface_faults
 from castblast.muckpile.walls import Walls, join, surface
-from castblast.specs.loading import Spec, read_text
+from castblast.specs.ground_heights import Heights, read_heights
+from castblast.specs.loading import Spec
+from castblast.specs.place import Extent, extent, place_faults, place_remarks, shown_length
 from castblast.specs.quantity import QuantityError, QuantityIn
+from castblast.specs.stl_file import load_stl, single_precision_remark
+from castblast.specs.units import unit_factor
 
-_GRID_KEYS = ("x0", "y0", "dx")
-_AXIS_KEYS = ("x", "y")
-_HEADER = ("ncols", "nrows", "cellsize")
-#: Largest difference of a place from a regular grid, over its spacing.
-_OFF_GRID = 1e-3
+_ONTO = "'shift' would have to be {offset} for its least corner to lie at the toe of the bench"
+#: Depth [m] below the floor from which it is said that the floor lies over the ground there.
+_HOLLOW = 0.3
+#: Corners further apart than this share of a side are not the same corner.
+_LARGEST_WELD = 0.25
 
-_Shift = Annotated[float, QuantityIn("m", -1e7, 1e7)]
+_Shift = Annotated[float, QuantityIn("m", -2e7, 2e7)]
+
+
+def _length_unit(unit: str) -> str:
+    unit_factor(unit, "m")
+    return unit
 
 
 class GroundSpec(Spec):
@@ -35,10 +43,13 @@ class GroundSpec(Spec):
     Attributes
     ----------
     heightmap : str, optional
-        ``.npz`` with height (ny, nx) in m and either x (nx,), y (ny,) or x0, y0, dx and maybe dy;
-        ``.csv`` with the columns x, y, z in any order of rows; ``.asc``, an ESRI grid.
+        ``.npz`` with height (ny, nx) and either x (nx,), y (ny,) or x0, y0, dx and maybe dy;
+        ``.csv``, ``.txt``, ``.xyz`` with the columns x, y, z in any order of rows, on a grid or
+        scattered; ``.asc``, an ESRI grid.
     stl : str, optional
-        STL file in m; its facets are counter-clockwise seen from the side of the balls.
+        STL file; its facets are counter-clockwise seen from the side of the balls.
+    unit : str
+        Of a file that gives none: ``mm``, ``ft``; default: m.
     shift : 3 lengths
         Added to the coordinates of the file, onto the frame of the bench.
     friction : float, optional
@@ -52,23 +63,38 @@ class GroundSpec(Spec):
     extend : length
         The outermost heights go on outwards so far, such as half a cell of a surface that is given
         by the middles of its cells.
+    spacing : length, optional
+        Of the grid onto which scattered points are brought; default: that of the points.
+    mend : bool
+        Corners of an STL surface that lie close together are joined, facets without height or given
+        twice dropped, and those that face the wrong way turned; what was done is said. Otherwise
+        each of these is refused.
+    weld : length, optional
+        How close; default: 1 mm, and no more than a hundredth of the facets.
     """
 
     heightmap: Annotated[str, Field(min_length=1)] | None = None
     stl: Annotated[str, Field(min_length=1)] | None = None
+    unit: Annotated[str, AfterValidator(_length_unit)] = ""
     shift: tuple[_Shift, _Shift, _Shift] = (0.0, 0.0, 0.0)
     friction: Annotated[float, QuantityIn("1", 0.0, 5.0)] | None = None
     floor: Annotated[float, QuantityIn("m", -1e4, 1e4)] = 0.0
     smooth: Annotated[float, QuantityIn("m", 0.0, 1e3)] = 0.0
     extend: Annotated[float, QuantityIn("m", 0.0, 1e4)] = 0.0
+    spacing: Annotated[float, QuantityIn("m", 0.01, 1e3)] | None = None
+    mend: bool = True
+    weld: Annotated[float, QuantityIn("m", 0.0, 1.0)] | None = None
 
     @model_validator(mode="after")
     def _one_of_two(self) -> GroundSpec:
         if (self.heightmap is None) == (self.stl is None):
             message = "exactly one of 'heightmap' and 'stl' is needed"
             raise QuantityError(message)
-        if self.stl is not None and (self.smooth or self.extend):
-            message = "'smooth' and 'extend' go with a heightmap"
+        if self.stl is not None and (self.smooth or self.extend or self.spacing):
+            message = "'smooth', 'extend' and 'spacing' go with a heightmap"
+            raise QuantityError(message)
+        if self.stl is None and {"mend", "weld"} & self.model_fields_set:
+            message = "'mend' and 'weld' go with an STL file"
             raise QuantityError(message)
         return self
 
@@ -80,31 +106,65 @@ def one_or_many(value: object) -> object:
     return [value] if isinstance(value, Mapping) else value
 
 
-def read_ground(grounds: tuple[GroundSpec, ...], beside: Path) -> Walls:
+class Ground(NamedTuple):
+    """All surfaces of a bench.
+
+    Attributes
+    ----------
+    walls : Walls
+    remarks : tuple of str
+        What was mended, left out or found odd, with the file; one line each.
+    maps : tuple of (Path, Heights)
+        Heights as the walls have them, in the frame of their files.
+    """
+
+    walls: Walls
+    remarks: tuple[str, ...] = ()
+    maps: tuple[tuple[Path, Heights], ...] = ()
+
+
+def read_ground(
+    grounds: tuple[GroundSpec, ...], beside: Path, bench: Bench | None = None
+) -> Ground:
     """Read all surfaces; file names are relative to the folder `beside`.
+
+    Parameters
+    ----------
+    grounds : tuple of GroundSpec
+    beside : Path
+    bench : Bench, optional
+        Surfaces are held against its place and size.
 
     Raises
     ------
     SpecError
         One line per fault, with file, row and column or facet.
     """
-    if not grounds:
-        return surface(np.zeros((0, 3, 3)))
-    return join(*(_read_one(ground, beside) for ground in grounds))
+    parts = [surface(np.zeros((0, 3, 3)))]
+    remarks: list[str] = []
+    maps: list[tuple[Path, Heights]] = []
+    for ground in grounds:
+        path = beside / (ground.stl or ground.heightmap or "")
+        if ground.stl is not None:
+            walls, said = _read_surface(ground, path, bench)
+        else:
+            heights = _read_map(ground, path)
+            maps.append((path, heights))
+            walls, said = _map_walls(ground, heights, path, bench)
+        parts.append(walls)
+        remarks += [f"{path}: {line}" for line in said]
+    return Ground(join(*parts), tuple(remarks), tuple(maps))
 
 
-def rough_ground(grounds: tuple[GroundSpec, ...], beside: Path, radius: float) -> list[str]:
+def rough_ground(ground: Ground, radius: float) -> list[str]:
     """Name heightmaps that are rougher than balls of mean `radius` [m] can lie on; []: none.
 
     Ridges and pits thinner than a ball, higher than its radius, hold it on both sides at once, deep
     inside the rock: it gains energy from nothing.
     """
     faults = []
-    for ground in grounds:
-        if ground.heightmap is None:
-            continue
-        _, _, height = _heights(ground, beside)
-        step = [np.diff(height, axis=axis) for axis in (0, 1)]
+    for path, heights in ground.maps:
+        step = [np.diff(heights.height, axis=axis) for axis in (0, 1)]
         pairs = [
             (s[:-1], s[1:]) if axis == 0 else (s[:, :-1], s[:, 1:]) for axis, s in enumerate(step)
         ]
@@ -114,39 +174,132 @@ def rough_ground(grounds: tuple[GroundSpec, ...], beside: Path, radius: float) -
         )
         if rough:
             faults.append(
-                f"{beside / ground.heightmap}: {rough} heights stand out from both neighbours by "
+                f"{path}: {rough} heights stand out from both neighbours by "
                 f"more than the mean radius of the balls, {radius:.2g} m; set "
                 f"'smooth: {4.0 * radius:.1g} m' or a wider grid"
             )
     return faults
 
 
-def _heights(ground: GroundSpec, beside: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
-    assert ground.heightmap is not None
-    x, y, height = read_heights(beside / ground.heightmap)
+def _read_map(ground: GroundSpec, path: Path) -> Heights:
+    heights = read_heights(path, ground.unit, ground.spacing)
     if ground.smooth > 0.0:
-        height = smooth_heights(x, y, height, ground.smooth)
-    return x, y, height
+        smooth = smooth_heights(heights.x, heights.y, heights.height, ground.smooth)
+        heights = heights._replace(height=smooth)
+    return heights
 
 
-def _read_one(ground: GroundSpec, beside: Path) -> Walls:
+def _map_walls(
+    ground: GroundSpec, heights: Heights, path: Path, bench: Bench | None
+) -> tuple[Walls, list[str]]:
     friction = math.nan if ground.friction is None else ground.friction
-    if ground.stl is not None:
-        corner = read_stl(beside / ground.stl) + np.array(ground.shift)
-        return surface(corner, friction, base=ground.floor)
-    x, y, height = _heights(ground, beside)
+    x, y, height = heights.x, heights.y, heights.height
     if ground.extend > 0.0:
         x, y = (np.array([v[0] - ground.extend, *v, v[-1] + ground.extend]) for v in (x, y))
         height = np.pad(height, 1, mode="edge")
     dx, dy, dz = ground.shift
-    return heightmap(x + dx, y + dy, height + dz, friction, base=ground.floor)
+    x, y, height = x + dx, y + dy, height + dz
+    known = height[np.isfinite(height)]
+    where = Extent(np.array([x[0], y[0], known.min()]), np.array([x[-1], y[-1], known.max()]))
+    remarks = [*heights.remarks, *_place(ground, where, path, bench)]
+    remarks += _below_floor(known, ground.floor, "heights")
+    return heightmap(x, y, height, friction, base=ground.floor), remarks
+
+
+def _below_floor(height: FloatArray, floor: float, what: str) -> list[str]:
+    """Say that the endless floor lies over hollows of the ground."""
+    low = height < floor - _HOLLOW
+    if not low.any():
+        return []
+    return [
+        f"{low.sum()} of {height.size} {what} lie below the floor at {floor:g} m, the lowest at "
+        f"{height.min():.3g} m: rock comes to rest on the floor there"
+    ]
+
+
+def _place(ground: GroundSpec, where: Extent, path: Path, bench: Bench | None) -> list[str]:
+    """Hold a surface against the bench; returns what is odd, raises what cannot be."""
+    if bench is None:
+        return []
+    # The offset that is offered is the whole of it, not what to add.
+    written = Extent(where.low - np.array(ground.shift), where.high - np.array(ground.shift))
+    if faults := place_faults(where, bench, _ONTO, written):
+        raise SpecError("\n".join(f"{path}: {fault}" for fault in faults))
+    return place_remarks(where, bench)
+
+
+def _read_surface(ground: GroundSpec, path: Path, bench: Bench | None) -> tuple[Walls, list[str]]:
+    friction = math.nan if ground.friction is None else ground.friction
+    found = load_stl(path)
+    factor = unit_factor(ground.unit or "m", "m")
+    remarks = []
+    if found.single and (line := single_precision_remark(found.corner, factor)):
+        remarks.append(line)
+    corner = found.corner * factor + np.array(ground.shift)
+    remarks += _place(ground, extent(corner), path, bench)
+    towards = None if bench is None else _middle(bench)
+    mended, distance = mended_surface(path, corner, ground, towards)
+    remarks += [f"{_met(repair)}: {repair.done}" for repair in mended.repairs]
+    remarks += _below_floor(mended.corner[:, :, 2], ground.floor, "corners of facets")
+    count, gap = cracks(mended.corner, distance)
+    if count:
+        remarks.append(
+            f"{count} corners at its rims lie up to {shown_length(gap)} from another rim without "
+            f"being joined: a ball meets both; 'weld: {1e3 * gap * 1.01:.0f} mm' joins them"
+        )
+    walls = surface(mended.corner, friction, base=ground.floor, welded=True)
+    return walls, remarks
+
+
+def _middle(bench: Bench) -> FloatArray:
+    return np.array([-bench.width, bench.length, bench.height]) / 2.0
+
+
+def mended_surface(
+    path: Path, corner: FloatArray, ground: GroundSpec, towards: FloatArray | None = None
+) -> tuple[Mended, float]:
+    """Mend facets (t, 3, 3) [m] and hold what is left against the rules of a surface.
+
+    Returns
+    -------
+    mended : Mended
+    distance : float [m]
+        Within which corners were joined.
+
+    Raises
+    ------
+    SpecError
+        What is to be mended though the bench file says no, or what cannot be; facets by number.
+    """
+    distance = weld_distance(corner) if ground.weld is None else ground.weld
+    side = median_side(corner)
+    if distance > _LARGEST_WELD * side:
+        raise SpecError(
+            f"{path}: weld: {distance:g} m: too far for facets with sides of {side:.3g} m; "
+            f"allowed: 0 to {_LARGEST_WELD * side:.2g} m"
+        )
+    mended = mend(corner, distance, towards)
+    faults = surface_faults(mended.corner, mended.source)
+    if not ground.mend:
+        faults = [
+            f"{_met(r)}; not {r.done}, since 'mend' is false" for r in mended.repairs
+        ] + faults
+    if faults:
+        raise SpecError("\n".join(f"{path}: {fault}" for fault in faults))
+    return mended, distance
+
+
+def _met(repair: Repair) -> str:
+    count = len(repair.facet)
+    some = "1 facet" if count == 1 else f"{count:,} facets"
+    return f"{some} {repair.what} ({named_facets(repair.facet)})"
 
 
 def smooth_heights(x: FloatArray, y: FloatArray, height: FloatArray, width: float) -> FloatArray:
     """Average heights (ny, nx) with Gaussian weights of standard deviation `width`; all in m.
 
     Each height counts for the part of its axis that is nearest to it, so that the spacing of the
-    places does not matter.
+    places does not matter. Missing heights (NaN) count for nothing and stay missing.
     """
 
     def weights(place: FloatArray) -> FloatArray:
@@ -154,159 +307,9 @@ def smooth_heights(x: FloatArray, y: FloatArray, height: FloatArray, width: floa
         share = np.exp(-0.5 * apart**2) * np.gradient(place)[None, :]
         return np.asarray(share / share.sum(axis=1, keepdims=True))
 
-    return np.asarray(weights(y) @ height @ weights(x).T)
-
-
-def read_heights(path: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Read a grid of heights: x (nx,), y (ny,), height (ny, nx), all in m.
-
-    Raises
-    ------
-    SpecError
-        One line per fault.
-    """
-    readers = {".npz": _read_npz, ".csv": _read_csv, ".asc": _read_asc}
-    reader = readers.get(path.suffix.lower())
-    if reader is None:
-        raise SpecError(f"{path}: heights must be in a .npz, .csv or .asc file")
-    x, y, height = reader(path)
-    if faults := height_faults(x, y, height):
-        raise SpecError("\n".join(f"{path}: {fault}" for fault in faults))
-    return x, y, height
-
-
-def _read_npz(path: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            stored: dict[str, NDArray[Any]] = {key: archive[key] for key in archive.files}
-    except FileNotFoundError:
-        raise SpecError(f"{path}: no such file") from None
-    except (AttributeError, OSError, ValueError, EOFError, zipfile.BadZipFile) as fault:
-        line = str(fault).splitlines()[0] if str(fault) else type(fault).__name__
-        raise SpecError(f"{path}: is no readable .npz file ({line})") from None
-    needed = _AXIS_KEYS if all(key in stored for key in _AXIS_KEYS) else _GRID_KEYS
-    missing = [key for key in ("height", *needed) if key not in stored]
-    if missing:
-        found = ", ".join(stored) or "nothing"
-        lines = [f"{path}: {key}: is missing{nearest_name(key, list(stored))}" for key in missing]
-        raise SpecError("\n".join([*lines, f"{path}: the file holds {found}"]))
-    bad = [key for key in ("height", *needed) if stored[key].dtype.kind not in "fiu"]
-    if bad:
-        raise SpecError("\n".join(f"{path}: {key}: numbers are needed" for key in bad))
-    height = np.asarray(stored["height"], dtype=np.float64)
-    if needed == _AXIS_KEYS:
-        x, y = (np.asarray(stored[key], dtype=np.float64) for key in _AXIS_KEYS)
-        return x, y, height
-    if height.ndim != 2:
-        raise SpecError(f"{path}: height: shape {height.shape}; (ny, nx) is needed")
-    dx = float(stored["dx"])
-    dy = float(stored.get("dy", stored["dx"]))
-    rows, columns = height.shape
-    return _line(stored["x0"], dx, columns), _line(stored["y0"], dy, rows), height
-
-
-def _line(start: Any, spacing: float, count: int) -> FloatArray:
-    return np.asarray(float(start) + spacing * np.arange(count), dtype=np.float64)
-
-
-def _read_csv(path: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
-    lines = read_text(path).splitlines()
-    names = [name.strip().split(" ")[0].lower() for name in lines[0].split(",")] if lines else []
-    missing = [name for name in ("x", "y", "z") if name not in names]
-    if missing:
-        raise SpecError(f"{path}: line 1: the columns x, y, z are needed; missing: {missing}")
-    columns = [names.index(name) for name in ("x", "y", "z")]
-    rows = np.empty((len(lines) - 1, 3))
-    for number, line in enumerate(lines[1:]):
-        parts = line.split(",")
-        try:
-            rows[number] = [float(parts[c]) for c in columns]
-        except (ValueError, IndexError):
-            raise SpecError(f"{path}: line {number + 2}: {line[:60]!r}: is no x, y, z") from None
-    bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
-    if len(bad):
-        raise SpecError(f"{path}: line {bad[0] + 2}: not a number ({len(bad)} such lines)")
-    return _grid_of_points(path, rows)
-
-
-def _grid_of_points(path: Path, rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Put points (k, 3) in any order onto the grid that they form."""
-    x, column = _places(rows[:, 0])
-    y, row = _places(rows[:, 1])
-    height = np.full((len(y), len(x)), np.nan)
-    count = np.zeros(height.shape, dtype=np.int64)
-    np.add.at(count, (row, column), 1)
-    if (count > 1).any():
-        first = np.flatnonzero((count > 1)[row, column])[1]
-        raise SpecError(f"{path}: line {first + 2}: two heights at one place")
-    height[row, column] = rows[:, 2]
-    return x, y, height
-
-
-def _places(values: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Distinct places among `values` and the number of the place of each; close ones are one."""
-    order = np.argsort(values, kind="stable")
-    gap = np.diff(values[order])
-    # Places written with few digits differ a little from row to row.
-    new = np.concatenate([[True], gap > _OFF_GRID * max(float(gap.max(initial=0.0)), 1e-300)])
-    number = np.empty(len(values), dtype=np.int64)
-    number[order] = np.cumsum(new) - 1
-    return values[order][new], number
-
-
-def _read_asc(path: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Read an ESRI grid: header of keys and values, rows from north to south."""
-    header: dict[str, float] = {}
-    lines = read_text(path).splitlines()
-    while lines and len(header) < 6 and lines[0].split() and lines[0].split()[0][0].isalpha():
-        key, *rest = lines.pop(0).lower().split()
-        try:
-            header[key] = float(rest[0])
-        except (ValueError, IndexError):
-            raise SpecError(f"{path}: header: {key}: a number is needed") from None
-    missing = [key for key in _HEADER if key not in header]
-    missing += [
-        f"{axis}llcorner"
-        for axis in "xy"
-        if not {f"{axis}llcorner", f"{axis}llcenter"} & set(header)
-    ]
-    if missing:
-        raise SpecError(f"{path}: header: missing: {', '.join(missing)}")
-    nx, ny = int(header["ncols"]), int(header["nrows"])
-    try:
-        values = np.array(" ".join(lines).split(), dtype=np.float64)
-    except ValueError as fault:
-        raise SpecError(f"{path}: {fault}") from None
-    if len(values) != nx * ny:
-        raise SpecError(f"{path}: {len(values)} heights; nrows x ncols = {ny} x {nx} is needed")
-    height = values.reshape(ny, nx)[::-1].copy()
-    height[height == header.get("nodata_value", -9999.0)] = np.nan
-    size = header["cellsize"]
-    x0, y0 = (
-        header.get(f"{axis}llcenter", header.get(f"{axis}llcorner", 0.0) + 0.5 * size)
-        for axis in "xy"
-    )
-    return _line(x0, size, nx), _line(y0, size, ny), height
-
-
-def read_stl(path: Path) -> FloatArray:
-    """Read the facets (t, 3, 3) [m] of an STL file, text or binary.
-
-    Raises
-    ------
-    SpecError
-        No file, trimesh is not installed, not an STL, or a fault of the surface, with its facets.
-    """
-    if not path.is_file():
-        raise SpecError(f"{path}: no such file")
-    require("stl", purpose=f"{path}: an STL file")
-    import trimesh
-
-    try:
-        mesh = trimesh.load_mesh(str(path), file_type="stl", process=False)
-        corner = np.asarray(mesh.triangles, dtype=np.float64)
-    except Exception as fault:  # trimesh raises whatever its parsers raise
-        raise SpecError(f"{path}: is no readable STL file ({fault})") from None
-    if faults := surface_faults(corner):
-        raise SpecError("\n".join(f"{path}: {fault}" for fault in faults))
-    return corner
+    along, across = weights(x).T, weights(y)
+    known = np.isfinite(height)
+    if known.all():
+        return np.asarray(across @ height @ along)
+    total = across @ np.where(known, height, 0.0) @ along
+    return np.where(known, total / np.maximum(across @ known @ along, 1e-300), np.nan)

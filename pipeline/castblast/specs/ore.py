@@ -20,6 +20,7 @@ from castblast.muckpile.ore import OrePolygon
 from castblast.muckpile.particles import FloatArray
 from castblast.specs.frame import FrameSpec
 from castblast.specs.loading import Label, Spec, load_spec, make_spec
+from castblast.specs.place import extent, place_faults
 from castblast.specs.quantity import QuantityIn
 from castblast.specs.table import Form, read_table
 
@@ -126,6 +127,8 @@ def _shape_faults(polygons: tuple[OrePolygon, ...], bench: Bench | None) -> list
     """Say what is wrong with names, corners and places; []: nothing."""
     import shapely
 
+    if bench is not None and (wrong := _place_faults(polygons, bench)):
+        return wrong
     times = Counter(polygon.name for polygon in polygons)
     faults = [f"'{name}': the name is used {n} times" for name, n in times.items() if n > 1]
     shapes = []
@@ -150,6 +153,15 @@ def _shape_faults(polygons: tuple[OrePolygon, ...], bench: Bench | None) -> list
             if common > _OVERLAP * min(shape.area, beside.area):
                 faults.append(f"'{other}' and '{name}' overlap by {common:.3g} m2")
     return faults
+
+
+def _place_faults(polygons: tuple[OrePolygon, ...], bench: Bench) -> list[str]:
+    """Say that all polygons lie in another grid or in another unit; []: neither."""
+    corners = np.concatenate([polygon.corners for polygon in polygons])
+    if not np.isfinite(corners).all():
+        return []
+    onto = "move the corners by {offset}, or say in 'frame' of the bench file where it lies there"
+    return place_faults(extent(corners), bench, onto, inside=True)
 
 
 def _plan(bench: Bench) -> Any:

@@ -24,7 +24,7 @@ from castblast.progress import ProgressCallback, silent
 from castblast.resources import find_spec
 from castblast.specs.balls import ChosenSizes
 from castblast.specs.bench import BenchSpec, load_bench
-from castblast.specs.ground import read_ground, rough_ground
+from castblast.specs.ground import Ground, read_ground, rough_ground
 from castblast.specs.quantity import parse_quantity
 from castblast.stages.muckpile_deck import Decks, write_decks
 from castblast.stages.muckpile_extras import Extras, read_extras
@@ -109,7 +109,8 @@ def run_muckpile(
     geometry = spec.bench.to_bench()
     ore_of_bench = path.parent / spec.ore if spec.ore else None
     wanted = read_extras(extras, geometry, ore_of_bench, spec.frame)
-    walls = _walls(spec, geometry, path.parent)
+    ground = read_ground(spec.ground, path.parent, geometry)
+    walls = _walls(spec, geometry, ground)
     plan = make_plan(spec, geometry, path.parent, one_speed=velocity is not None)
     folder = Path("runs") / spec.name if out is None else out
     threads = threads or 0
@@ -123,10 +124,10 @@ def run_muckpile(
         _part(progress, 0.0, _PACKING_SHARE),
     )
     case = _case(spec, walls, start.balls, plan, threads)
-    _require_possible(spec, case, path.parent)
+    _require_possible(spec, case, ground)
     if decks.wanted:
         written = write_decks(spec, case, decks)
-        return replace(written, remarks=velocity_remarks(plan.prediction))
+        return _with_remarks(replace(written, remarks=velocity_remarks(plan.prediction)), ground)
     folder.mkdir(parents=True, exist_ok=True)
     result, frames = _simulate(
         spec, case, folder, extras, wanted.interval, _part(progress, _PACKING_SHARE, _CAST_SHARE)
@@ -142,10 +143,18 @@ def run_muckpile(
     ore = follow_ore(wanted.ore, wanted.plan, case, result)
     outcome = describe_run(spec, plan.speed, plan.prediction, start, result, metrics, ore)
     more = {"fragments": _describe_sizes(sizes), **bench_content(spec, path.parent)}
-    outcome = replace(outcome, document=outcome.document | more)
+    outcome = _with_remarks(replace(outcome, document=outcome.document | more), ground)
     files = write_results(folder, spec, case, result, outcome.document, ore, plan.label) + frames
     progress(1.0, f"{result.time:.1f} s simulated")
     return replace(outcome, files=files)
+
+
+def _with_remarks(outcome: MuckpileOutcome, ground: Ground) -> MuckpileOutcome:
+    """Outcome that says what was mended, left out or found odd in files of ground."""
+    if not ground.remarks:
+        return outcome
+    document = outcome.document | {"ground_remarks": list(ground.remarks)}
+    return replace(outcome, document=document, remarks=[*ground.remarks, *outcome.remarks])
 
 
 def _simulate(
@@ -250,7 +259,7 @@ def _describe_sizes(chosen: ChosenSizes | None) -> dict[str, Any] | None:
     }
 
 
-def _walls(spec: BenchSpec, bench: Bench, beside: Path) -> Walls:
+def _walls(spec: BenchSpec, bench: Bench, ground: Ground) -> Walls:
     if bench.corners:
         parts = [rock_walls(bench)]
     else:
@@ -258,7 +267,7 @@ def _walls(spec: BenchSpec, bench: Bench, beside: Path) -> Walls:
     if spec.slope is not None:
         parts.append(slope(spec.slope.distance, spec.slope.angle))
     if spec.ground:
-        parts.append(read_ground(spec.ground, beside))
+        parts.append(ground.walls)
     return join(*parts)
 
 
@@ -283,12 +292,12 @@ def _case(spec: BenchSpec, walls: Walls, balls: Particles, plan: Plan, threads: 
     )
 
 
-def _require_possible(spec: BenchSpec, case: CastCase, beside: Path) -> None:
+def _require_possible(spec: BenchSpec, case: CastCase, ground: Ground) -> None:
     """Refuse walls that cut the balls, rough ground, and a fixed step above the stable one."""
     allowed = pressed_share(case.particles, case.law, case.gravity)
     cuts = wall_faults(case.walls, case.particles, allowed)
     faults = [f"{spec.name}: {cut}" for cut in cuts]
-    faults += rough_ground(spec.ground, beside, float(case.particles.radius.mean()))
+    faults += rough_ground(ground, float(case.particles.radius.mean()))
     if not faults and case.time_step > 0.0:
         stable = _stable_step(case)
         if case.time_step > stable:
