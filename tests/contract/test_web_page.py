@@ -333,13 +333,17 @@ def test_refusals_are_said_in_words_and_in_the_units_of_the_reader(ask) -> None:
     assert "_" not in metric + us
 
 
+def table_head(network: Network) -> str:
+    return ",".join(["explosive", *(f"{c.name} [{c.unit}]" for c in network.inputs)])
+
+
 def test_a_table_of_designs_tells_impossible_ones_by_line(ask) -> None:
     network, evaluated = ask
     good = as_charged(network, {})
     bad = good | {"bench_height": 2.0}
     text = "\n".join(
         [
-            "explosive," + ",".join(network.input_names),
+            table_head(network),
             *(",".join(["anfo", *(repr(v) for v in row.values())]) for row in (good, bad)),
         ]
     )

@@ -62,6 +62,7 @@ SAVED = {
     "units below": "x,delay,explosive\nm,ms,\n-1.5,0,anfo\n4.25,42,\n",
     "units below, in brackets": "x,delay,explosive\n[m],[ms],\n-1.5,0,anfo\n4.25,42,\n",
     "units behind numbers": "x,delay,explosive\n-1.5 m,0 s,anfo\n425 cm,42ms,\n",
+    "units and decimal commas": "x;delay;explosive\n-1,5 m;0 s;anfo\n425,0 cm;42ms;\n",
     "blank ends": "x [m],delay [ms],explosive,,\n-1.5,0,anfo,,\n4.25,42,,,\n,,,,\n\n",
     "remarks": "# made by hand\n" + PLAIN.replace("\n4", '\n# a, "remark\n   # more\n4'),
     "quotation marks": '"x [m]","delay [ms]","explosive"\n"-1.5","0","anfo"\n"4.25","42",""\n',

@@ -27,9 +27,17 @@ PAGE = "index.html"
 _FOLDER = Path(__file__).parent / "templates" / "web"
 #: In the order in which they need each other; names at their top level differ.
 _SCRIPTS = (
-    "units", "rule", "design", "histories", "answers", "domain", "drawing", "figures", "batch",
-    "controls", "page",
+    "units", "rule", "design", "histories", "answers", "domain", "drawing", "figures", "table",
+    "batch", "controls", "page",
 )  # fmt: skip
+#: Units that a table of designs may be written in, as people spell them.
+_UNITS = {
+    "m": ("m", "mm", "cm", "km", "in", "ft"),
+    "Pa": ("Pa", "kPa", "MPa", "GPa", "bar", "kbar", "psi"),
+    "rad": ("rad", "deg", "°"),
+    "1": ("1", "%", "percent"),
+    "kg m-3": ("kg m-3", "kg/m3", "kg/m^3", "kg/m³", "g/cm3", "g/cm³", "g/cc", "t/m3", "lb/ft3"),
+}
 _IMPORT = re.compile(r"^import .*?;\n", re.MULTILINE | re.DOTALL)
 _EXPORT = re.compile(r"^export ", re.MULTILINE)
 _BEGIN, _END = "/* model.js begins */\n", "/* model.js ends */\n"
@@ -83,6 +91,7 @@ def _facts(network: Network, histories: Mapping[str, Any] | None) -> dict[str, A
         # What follows from other inputs is completed, as `predict` does.
         "held": {n: v for n, v in held.items() if n in VARIABLES and n not in COMPLETED},
         "rule": rules_as_data(),
+        "table": _table_facts(network),
         "variables": {
             name: {
                 "title": v.long_name.split(";")[0],
@@ -97,6 +106,25 @@ def _facts(network: Network, histories: Mapping[str, Any] | None) -> dict[str, A
         },
         "scores": network.provenance.get("scores", {}).get("test", {}),
         "histories": histories,
+    }
+
+
+def _table_facts(network: Network) -> dict[str, Any]:
+    """What tables of designs may say: heads of ids, units to SI, names of explosives."""
+    from castblast.specs.catalogue import explosive_aliases, spelled
+    from castblast.specs.table import ID_HEADS
+    from castblast.specs.units import unit_factor
+
+    names = {spelled(name): name for name in network.explosives}
+    known = {alias: names[spelled(own)] for alias, own in explosive_aliases().items()
+             if spelled(own) in names}  # fmt: skip
+    return {
+        "ids": ID_HEADS,
+        "units": {
+            unit: {written: unit_factor(written, unit) for written in spellings}
+            for unit, spellings in _UNITS.items()
+        },
+        "explosives": known | names,
     }
 
 

@@ -20,6 +20,7 @@ _COMMA = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?", re.ASCII)
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:[,.' \u00a0\u202f]\d{3})+(?:[.,]\d*)?", re.ASCII)
 _FORTRAN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)[dD][+-]?\d+", re.ASCII)
 _WITH_UNIT = re.compile(r"[+-]?(?:\d|\.\d)\S*\s*[^\W\d].*|[+-]?[\d.]+\s*[%°]")
+_COMMA_UNIT = re.compile(r"([+-]?\d*),(\d+(?:[eE][+-]?\d+)?\s*[^\d\s].*)")
 _LONGEST_CELL = 40
 
 
@@ -107,16 +108,23 @@ class NumberColumn:
             return (value, "") if math.isfinite(value) else (math.nan, "is too large for a number")
         if self.comma and _COMMA.fullmatch(cell):
             self.plain = True
-            if len(self.commas) < MOST_FAULTS:
-                self.commas.append((row, cell))
+            self._saw_comma(row, cell)
             return float(cell.replace(",", ".")), ""
         if not self.written and _WITH_UNIT.fullmatch(cell) and not _FORTRAN.fullmatch(cell):
+            plain = cell
+            if self.comma and (match := _COMMA_UNIT.fullmatch(cell)):
+                plain = f"{match[1]}.{match[2]}"
+                self._saw_comma(row, cell)
             try:
-                value = convert(cell, self.unit)
+                value = convert(plain, self.unit)
             except QuantityError as fault:
                 return math.nan, str(fault)
             return value, ""
         return math.nan, _why(cell)
+
+    def _saw_comma(self, row: int, cell: str) -> None:
+        if len(self.commas) < MOST_FAULTS:
+            self.commas.append((row, cell))
 
     def values(self) -> NDArray[np.float64]:
         """All that was read, in the order of the rows."""

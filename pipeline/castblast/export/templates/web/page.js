@@ -1,6 +1,7 @@
 /* The page: one state, drawn whenever it changes. */
 import { network, selfTest } from "../model.js";
 import { answerBatch, batchTemplate, csvText } from "./batch.js";
+import { decoded } from "./table.js";
 import { buildControls, buildTabs, showRange, showValue } from "./controls.js";
 import { domainWords } from "./domain.js";
 import { resultsOf, sensitivityOf, validRange } from "./answers.js";
@@ -188,7 +189,7 @@ at("copy").addEventListener("click", async () => {
 });
 at("batch-template").addEventListener("click", () => download("designs.csv", batchTemplate(state.design)));
 at("batch-save").addEventListener("click", () => download("answers.csv", state.batch));
-at("batch-file").addEventListener("change", async () => { const file = at("batch-file").files[0]; if (file) runBatch(await file.text()); });
+at("batch-file").addEventListener("change", async () => { const file = at("batch-file").files[0]; if (file) runBatch(decoded(await file.arrayBuffer())); });
 // What came with the event: the bar may have got the link of the present design meanwhile.
 window.addEventListener("hashchange", (event) => restore(new URL(event.newURL).hash));
 if (facts.histories) {
