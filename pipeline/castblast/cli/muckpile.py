@@ -138,6 +138,44 @@ def compare_muckpiles(
     return _show(screen, compare_runs(folders, Path() if out is None else out))
 
 
+def measure_muckpile(
+    screen: Screen,
+    bench: Annotated[str, typer.Argument(help="Bench file (YAML), or the name of one.")],
+    final: Annotated[
+        Path, typer.Argument(help="Balls at the end: final.dump of a deck, or a file of balls.")
+    ],
+    out: OutFolder = None,
+    start: Annotated[
+        Path | None,
+        typer.Option(
+            help="The same balls before firing; default: those of the bench file, or balls.data "
+            "beside FINAL.",
+            show_default=False,
+        ),
+    ] = None,
+    ore: Annotated[
+        Path | None,
+        typer.Option(help="Ore polygons (YAML or CSV).", show_default=False),
+    ] = None,
+    dig_block: Annotated[
+        str | None,
+        typer.Option(help='Side of a dig block, "3 m"; default: spacing.', show_default=False),
+    ] = None,
+    flitch: Annotated[
+        str | None,
+        typer.Option(
+            help='Height of a dig block, "2.5 m"; default: the whole pile.', show_default=False
+        ),
+    ] = None,
+) -> Mapping[str, Any]:
+    """Measure what another engine threw: throw, profile and ore from its final balls."""
+    from castblast.stages.muckpile_extras import Extras
+    from castblast.stages.muckpile_measure import measure_muckpile as measure
+
+    extras = Extras(ore=ore, dig_block=dig_block, flitch=flitch)
+    return _show(screen, measure(bench, final, out, start=start, extras=extras))
+
+
 def _show(screen: Screen, outcome: "MuckpileOutcome") -> Mapping[str, Any]:
     screen.table(("quantity", "value", "unit"), outcome.rows, title=outcome.title)
     for line in outcome.remarks:
@@ -150,4 +188,5 @@ def _show(screen: Screen, outcome: "MuckpileOutcome") -> Mapping[str, Any]:
 def add_to(app: typer.Typer) -> None:
     """Register the verbs."""
     verb(app, needs=("simulate", "plot"), compiles="muckpile")(muckpile)
+    verb(app, needs=("simulate", "plot"))(measure_muckpile)
     verb(app, needs=("simulate", "plot"))(compare_muckpiles)

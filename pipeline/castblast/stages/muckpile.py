@@ -110,7 +110,7 @@ def run_muckpile(
     ore_of_bench = path.parent / spec.ore if spec.ore else None
     wanted = read_extras(extras, geometry, ore_of_bench, spec.frame)
     ground = read_ground(spec.ground, path.parent, geometry)
-    walls = _walls(spec, geometry, ground)
+    walls = bench_surroundings(spec, geometry, ground)
     plan = make_plan(spec, geometry, path.parent, one_speed=velocity is not None)
     folder = Path("runs") / spec.name if out is None else out
     threads = threads or 0
@@ -259,7 +259,8 @@ def _describe_sizes(chosen: ChosenSizes | None) -> dict[str, Any] | None:
     }
 
 
-def _walls(spec: BenchSpec, bench: Bench, ground: Ground) -> Walls:
+def bench_surroundings(spec: BenchSpec, bench: Bench, ground: Ground) -> Walls:
+    """All that balls meet: floor, rock around the bench, slope, ground."""
     if bench.corners:
         parts = [rock_walls(bench)]
     else:

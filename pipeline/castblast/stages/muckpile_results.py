@@ -116,7 +116,7 @@ def describe_run(
         "counters": counters,
         "seconds": seconds,
     }
-    plain: dict[str, Any] = _plain(document)
+    plain: dict[str, Any] = as_plain(document)
     title = (
         f"{spec.name}: {plain['balls']:,} balls, {velocity_words(plain)} m/s, "
         f"{result.time:.1f} s simulated"
@@ -252,12 +252,12 @@ def _draw(
     return files
 
 
-def _plain(value: Any) -> Any:
+def as_plain(value: Any) -> Any:
     """Arrays and NumPy scalars as Python lists and numbers, at any depth."""
     if isinstance(value, Mapping):
-        return {key: _plain(item) for key, item in value.items()}
+        return {key: as_plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [as_plain(item) for item in value]
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
