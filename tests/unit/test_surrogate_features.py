@@ -2,22 +2,25 @@
 
 import dataclasses
 import re
+from pathlib import Path
 from typing import get_args
 
 import numpy as np
 import pytest
 
-from castblast.errors import DatasetError, Status
-from castblast.specs.model import PAPER_FEATURES, PAPER_TARGETS
+from castblast.errors import DatasetError, SpecError, Status
+from castblast.specs.model import PAPER_FEATURES, PAPER_TARGETS, MlpSpec, RidgeSpec
 from castblast.specs.recipe import SPLIT_NAMES
+from castblast.stages.fitting import read_rows
+from castblast.surrogate.column_checks import check_positive
 from castblast.surrogate.features import (
     SPLITS,
     Split,
-    check_positive,
     domain_constraints,
     input_columns,
     read_table,
 )
+from castblast.surrogate.training import fit_spec
 
 
 @pytest.fixture(scope="module")
@@ -150,3 +153,42 @@ def test_logs_refuse_columns_that_reach_zero(toy_dataset) -> None:
     table = read_table(dataset, PAPER_FEATURES, PAPER_TARGETS)
     with pytest.raises(DatasetError, match=r"crushed_zone_radius: 1 rows .*sample 3: 0 m"):
         check_positive(table, PAPER_TARGETS)
+
+
+@pytest.mark.parametrize(
+    ("change", "line"),
+    [
+        ({"features": ("ucs", "poisson_ratio")},
+         "spec: features: poisson_ratio: the dataset holds it at 0.25, so nothing can be learned"),
+        ({"derived": {"length": {"coefficients": {"bench_height": 1.0, "charge_length": -1.0,
+                                                  "stemming_length": -1.0}}},
+          "features": ("bench_height", "charge_length", "stemming_length")},
+         "spec: derived: length: the sum of bench_height, charge_length, stemming_length is the"),
+        ({"targets": ("powder_factor",)},
+         "spec: targets: powder_factor: is 0.5 kg m-3 in every row of the dataset; there is"),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("kind", [RidgeSpec, MlpSpec])
+def test_what_the_dataset_holds_is_no_column_to_learn_from(toy_dataset, change, line, kind) -> None:
+    """One line each, from the library as from a verb, instead of a scaling by nothing."""
+    dataset = toy_dataset(600)
+    held = ("sample", np.full(600, 0.5), {"role": "output"})
+    dataset = dataset.assign(powder_factor=held)
+    spec = kind(name="spec", **change)
+    table = read_table(dataset, spec.features, spec.targets)
+    with pytest.raises(SpecError, match=re.escape(line)) as raised:
+        fit_spec(spec, table)
+    assert "\n" not in str(raised.value)
+    with pytest.raises(SpecError, match=re.escape(line)):
+        read_rows(dataset, [spec], Path("toy.nc"))
+
+
+@pytest.mark.parametrize(
+    "values",
+    [("sample", np.array(["a"] * 600)), ((), 0.5), (("sample", "place"), np.zeros((600, 2)))],
+    ids=["text", "one number", "a table"],
+)
+def test_what_is_no_column_of_numbers_is_told(toy_dataset, values) -> None:
+    dataset = toy_dataset(600).drop_vars("ucs").assign(ucs=values)
+    with pytest.raises(DatasetError, match=r"^ucs: is no column of numbers, one per sample$"):
+        read_table(dataset, PAPER_FEATURES, PAPER_TARGETS)

@@ -191,8 +191,9 @@ def _draw_parity(axis: Any, rows: HeldOutRows, target: str, letter: str = "") ->
         axis.scatter(truth[own], predicted[own], s=5, linewidths=0, alpha=0.6, color=colour,
                      label=words(str(kind)), rasterized=True)  # fmt: skip
     r2, error = (rows.scores[target][name] for name in ("r2", "relative_error_95"))
+    shown = "-" if r2 is None else f"{floor(r2 * 1e5) / 1e5:.5f}"
     axis.text(
-        0.98, 0.04, f"R² {floor(r2 * 1e5) / 1e5:.5f}\n95 % within {error:.2%}",
+        0.98, 0.04, f"R² {shown}\n95 % within {error:.2%}",
         transform=axis.transAxes, ha="right", va="bottom", fontsize=8,
     )  # fmt: skip
     axis.set(

@@ -39,16 +39,24 @@ def read_rows(dataset: Any, specs: Sequence[ModelSpec], path: Path) -> Table:
     ------
     DatasetError
         As `read_table`, with the path in front of every line.
+    SpecError
+        Features or targets that have one value in every row; all specs at once.
     """
+    from castblast.surrogate.column_checks import constant_faults
     from castblast.surrogate.features import read_table
 
     features = dict.fromkeys(name for spec in specs for name in spec.features)
     targets = dict.fromkeys(name for spec in specs for name in spec.targets)
     try:
-        return read_table(dataset, tuple(features), tuple(targets))
+        table = read_table(dataset, tuple(features), tuple(targets))
     except DatasetError as fault:
         lines = "\n".join(f"{path}: {line}" for line in str(fault).splitlines())
         raise DatasetError(lines) from None
+    named = [spec.resolved(table.varying or table.feature_names) for spec in specs]
+    faults = [line for spec in named for line in constant_faults(spec, table)]
+    if faults:
+        raise SpecError("\n".join(faults))
+    return table
 
 
 def require_training(

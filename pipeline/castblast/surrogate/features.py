@@ -137,8 +137,8 @@ def read_table(dataset: xr.Dataset, features: Sequence[str], targets: Sequence[s
     Raises
     ------
     DatasetError
-        Missing columns (with the nearest name), numbers that are not finite, too few rows of a
-        split, an explosive without training rows; all faults at once.
+        Missing columns (with the nearest name) and those that are none; numbers that are not
+        finite, too few rows of a split, an explosive without training rows; all faults at once.
     """
     varying = varying_inputs(dataset)
     features = expand(features, varying)
@@ -146,6 +146,11 @@ def read_table(dataset: xr.Dataset, features: Sequence[str], targets: Sequence[s
         f"{name}: the dataset has no such variable{nearest_name(name, map(str, dataset.data_vars))}"
         for name in (*features, *targets, "explosive", "split", "status")
         if name not in dataset.variables
+    ]
+    faults += [
+        f"{name}: is no column of numbers, one per sample"
+        for name in (*features, *targets, "explosive", "split", "status", "sample")
+        if name in dataset.variables and not _is_column(dataset[name])
     ]
     if faults:
         raise DatasetError("\n".join(faults))
@@ -186,9 +191,15 @@ def varying_inputs(dataset: xr.Dataset) -> tuple[str, ...]:
         name
         for name in INPUT_NAMES
         if name in dataset.data_vars
+        and _is_column(dataset[name])
         and dataset[name].attrs.get("role", "input") == "input"
         and float(np.ptp(dataset[name].to_numpy())) > 0.0
     )
+
+
+def _is_column(variable: xr.DataArray) -> bool:
+    """Whether a variable holds a number for each sample."""
+    return variable.dims == ("sample",) and variable.dtype.kind in "fiub"
 
 
 def _descriptors(dataset: xr.Dataset) -> dict[str, dict[str, float]]:
@@ -210,7 +221,7 @@ def _held(dataset: xr.Dataset, features: Sequence[str]) -> dict[str, float]:
     """Inputs beside the features that have one value in every row."""
     held = {}
     for name in INPUT_NAMES:
-        if name in dataset.data_vars and name not in features:
+        if name in dataset.data_vars and name not in features and _is_column(dataset[name]):
             values = np.unique(dataset[name].to_numpy())
             if len(values) == 1:
                 held[name] = float(values[0])
@@ -258,46 +269,6 @@ def _faults(table: Table, dropped: int) -> list[str]:
         if name not in set(train)
     ]
     return faults
-
-
-def check_positive(
-    table: Table, names: Sequence[str], derived: Mapping[str, Mapping[str, float]] | None = None
-) -> None:
-    """Refuse columns that are to be logged but hold values of 0 or below.
-
-    Parameters
-    ----------
-    table : Table
-    names : sequence of str
-        Features and targets.
-    derived : mapping of name to coefficients of inputs, optional
-        Sums of features.
-
-    Raises
-    ------
-    DatasetError
-        One line per column.
-    """
-    columns = {
-        name: table.targets[:, table.target_names.index(name)]
-        if name in table.target_names
-        else table.frame[name].to_numpy()
-        for name in names
-    }
-    for name, coefficients in (derived or {}).items():
-        columns[name] = np.sum([c * table.frame[n] for n, c in coefficients.items()], axis=0)
-    faults = []
-    for name, values in columns.items():
-        bad = np.flatnonzero(values <= 0.0)
-        if len(bad):
-            value = float(values[bad[0]])
-            shown = VARIABLES[name].show(value) if name in VARIABLES else f"{value:.6g}"
-            faults.append(
-                f"{name}: {len(bad)} rows are not above 0 (sample {table.sample[bad[0]]}: "
-                f"{shown}); a model with transform 'log' cannot use it"
-            )
-    if faults:
-        raise DatasetError("\n".join(faults))
 
 
 def input_columns(

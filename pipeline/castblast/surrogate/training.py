@@ -10,13 +10,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from castblast import __version__
+from castblast.errors import SpecError
 from castblast.network import Floats, Network, Shell
 from castblast.progress import ProgressCallback, silent
 from castblast.specs.model import ModelSpec
 from castblast.surrogate import estimators
+from castblast.surrogate.column_checks import check_positive, constant_faults
 from castblast.surrogate.conformal import band_coverage, conformal_band
 from castblast.surrogate.density import with_density
-from castblast.surrogate.features import SPLITS, Split, Table, check_positive
+from castblast.surrogate.features import SPLITS, Split, Table
 from castblast.surrogate.metrics import (
     Score,
     score_by_explosive,
@@ -141,11 +143,15 @@ def fit_spec(
         A column to be logged is not positive, the dataset has no descriptors of the explosives
         and the spec needs them, or the error band is not finite.
     SpecError
-        A user's own model that cannot be made or used.
+        A feature or target with one value in every row, or a user's own model that cannot be made
+        or used.
     """
     started = time.perf_counter()
     spec = spec.resolved(table.varying or table.feature_names)
     table = table.select(spec.features, spec.targets)
+    faults = constant_faults(spec, table)
+    if faults:
+        raise SpecError("\n".join(faults))
     logged = [name for name in table.feature_names if spec.transform_of(name) == "log"]
     logged += table.target_names if spec.target_transform == "log" else ()
     sums = {k: dict(e.coefficients) for k, e in spec.derived.items() if e.transform == "log"}
