@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from fake_blast import fake_simulator, write_recipe
 
+from castblast.blast import run_blasts
 from castblast.dataset.design import draw_batch, make_design, split_labels
-from castblast.errors import SpecError
+from castblast.errors import SpecError, Status
 from castblast.specs.recipe import load_recipe
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -200,3 +201,55 @@ def test_no_room_for_a_charge_names_the_physics(tmp_path):
     }
     with pytest.raises(SpecError, match="no room for a column charge"):
         design_of(tmp_path, variables=variables)
+
+
+NARROW = {  # soft rock, wide holes: in one bench of six the hole is as wide as burden or spacing
+    "ucs": {"lower": "10 MPa", "upper": "40 MPa", "distribution": "log_uniform"},
+    "burden": {"lower": "0.3 m", "upper": "2 m"},
+    "spacing": {"lower": 1.0, "upper": 1.5, "ratio_of": "burden"},
+    "hole_diameter": "250 mm",
+    "bench_height": "10 m",
+}
+
+
+def test_a_hole_that_outgrows_its_bench_is_drawn_anew(tmp_path):
+    """All rows end well in the real physics; the others are those of the plain draw."""
+    path = write_recipe(tmp_path / "r.yaml", variables=NARROW, size=60, constraints=None)
+    recipe, simulator = load_recipe(path).recipe, fake_simulator(path)
+    design = make_design(recipe, simulator, str(path))
+    plain = make_design(recipe, Credulous(simulator), str(path))
+    moved = design.columns["burden"] != plain.columns["burden"]
+    assert 3 <= moved.sum() <= 30
+    for name in ("explosive", "split", "sample"):
+        assert np.array_equal(getattr(design, name), getattr(plain, name))
+    assert np.all(design.batch[moved] > plain.batch.max())
+    assert design.drawn >= plain.drawn + moved.sum()
+
+    def status(rows):
+        return run_blasts(simulator.explosives, rows.explosive, rows.inputs).status
+
+    assert np.all(status(design) == Status.OK)
+    assert np.array_equal(status(plain) == Status.BAD_INPUT, moved)
+    again = make_design(recipe, simulator, str(path))
+    assert np.array_equal(again.columns["burden"], design.columns["burden"])
+
+
+class Credulous:
+    """A simulator that lets every hole expand."""
+
+    def __init__(self, real):
+        self.real = real
+
+    def __getattr__(self, name):
+        return getattr(self.real, name)
+
+    def outgrown(self, inputs, explosive):
+        return np.zeros(len(explosive), dtype=bool)
+
+
+def test_ranges_in_which_no_hole_fits_are_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("castblast.dataset.design._MOST_BATCHES", 3)
+    variables = NARROW | {"burden": {"lower": "0.25 m", "upper": "0.3 m"}, "ucs": "10 MPa"}
+    path = write_recipe(tmp_path / "r.yaml", variables=variables, size=4)
+    with pytest.raises(SpecError, match="still expand as wide as their burden or spacing"):
+        make_design(load_recipe(path).recipe, fake_simulator(path), str(path))

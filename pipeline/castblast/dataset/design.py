@@ -6,6 +6,9 @@ further batches, each as large as what is still missing. A Latin hypercube sprea
 box of the ranges; what is left after the drops spreads evenly over its possible part, without the
 pile-up at the edge that clipping would leave.
 
+A hole that expands as wide as its burden or spacing is known after its near field only. Rows near
+that limit are tried, with their explosive, and those beyond it are replaced last.
+
 Every number depends on the recipe alone: batches, explosives and splits draw from their own streams
 of the seed.
 """
@@ -157,17 +160,56 @@ def _draw_rows(
             "were drawn"
         )
         raise SpecError(message)
-    columns = _join(kept)
+    columns, batch = _join(kept), np.concatenate(batches)
     explosive = _balanced(count, len(recipe.explosives), _stream(recipe, _EXPLOSIVES, first_batch))
+    inputs = simulator.resolve(columns, explosive)
+    bad = np.flatnonzero(simulator.outgrown(inputs, explosive))
+    if len(bad):
+        drawn += _redraw(recipe, simulator, where, bad, columns, explosive, batch, number + 1)
+        inputs = simulator.resolve(columns, explosive)
     return Design(
         sample=np.arange(first_sample, first_sample + count, dtype=np.int32),
         columns=columns,
-        inputs=simulator.resolve(columns, explosive),
+        inputs=inputs,
         explosive=explosive,
         split=split_labels(count, recipe.split.shares, _stream(recipe, _SPLITS, first_batch)),
-        batch=np.concatenate(batches),
+        batch=batch,
         drawn=drawn,
     )
+
+
+def _redraw(
+    recipe: Recipe,
+    simulator: Simulator,
+    where: str,
+    bad: NDArray[np.intp],
+    columns: dict[str, FloatArray],
+    explosive: NDArray[np.int8],
+    batch: NDArray[np.int16],
+    number: int,
+) -> int:
+    """Draw rows `bad`, whose hole outgrows its bench, anew in place; how many were drawn.
+
+    A row keeps its explosive, and the first batch of new rows is `number`.
+    """
+    drawn, most = 0, number + _MOST_BATCHES
+    while len(bad):
+        if number == most:
+            message = (
+                f"{where}: variables: the holes of {len(bad)} designs still expand as wide as "
+                f"their burden or spacing after {drawn} were drawn anew"
+            )
+            raise SpecError(message)
+        rows = draw_batch(recipe, len(bad), _stream(recipe, _BATCHES, number))
+        possible = np.flatnonzero(_possible(recipe, simulator, rows))
+        place, rest = bad[: len(possible)], bad[len(possible) :]
+        for name, values in rows.items():
+            columns[name][place] = values[possible]
+        batch[place] = number
+        drawn, number = drawn + len(bad), number + 1
+        inputs = simulator.resolve(_take(columns, place), explosive[place])
+        bad = np.concatenate([place[simulator.outgrown(inputs, explosive[place])], rest])
+    return drawn
 
 
 def _join(parts: Sequence[Columns]) -> dict[str, FloatArray]:
