@@ -1,11 +1,13 @@
 """The shipped page in a real browser, from disk with the network off."""
 
 import json
+import re
 import shutil
 from contextlib import suppress
 
 import pytest
 
+from castblast.bands import BASIS
 from castblast.export.json_file import read_network
 from castblast.network import explosive_index, predict_rows
 from castblast.resources import resource
@@ -57,19 +59,33 @@ def test_values_equal_those_of_python(page) -> None:
         page.locator("[role=tab]").nth(tab).click()
         design = page.evaluate("castblast.state.design")
         names, answer = python_answers(design)
+        shown = {"si": answer.values, **answer.prediction._asdict()}
         for j, name in enumerate(names):
             cell = page.locator(f"#value-{name}")
-            for key, truth in (("si", answer[0]), ("lower", answer[1]), ("upper", answer[2])):
+            for key, truth in shown.items():
                 assert float(cell.get_attribute(f"data-{key}")) == pytest.approx(
                     truth[0, j], rel=1e-9
                 )
-        speed = answer[0][0, names.index("burden_velocity")]
-        assert page.locator("#value-burden_velocity").inner_text().split()[0] == f"{speed:#.4g}"
+        speed = answer.values[0, names.index("burden_velocity")]
+        assert page.locator("#value-burden_velocity").inner_text().split()[0] == f"{speed:#.3g}"
 
 
 def test_no_number_without_its_band(page) -> None:
-    for text in page.locator("#results .range").all_inner_texts():
+    for tile in page.locator("#results li").all():
+        text = tile.locator(".range").first.inner_text()
         assert " to " in text or "exact" in text
+    assert BASIS in page.locator("#basis").inner_text()
+
+
+def test_the_throw_stands_beside_its_free_flight(page) -> None:
+    text = page.locator("#results li", has=page.locator("#value-throw_distance")).inner_text()
+    assert re.search(r"free flight [\d.]+\s*m \S 1\.6", text)
+    lower, value, upper = (
+        float(page.locator("#value-throw_distance").get_attribute(f"data-{key}"))
+        for key in ("lower", "si", "upper")
+    )
+    assert lower < value / 1.9
+    assert upper > 1.9 * value
 
 
 def test_bad_input_is_marked_and_answers_vanish(page) -> None:
@@ -175,7 +191,7 @@ def test_a_thousand_rows_under_a_second(page, tmp_path) -> None:
     head, first = lines[0].split(","), lines[1].split(",")
     column = next(i for i, name in enumerate(head) if name.startswith("burden_velocity ["))
     assert float(first[column]) > 0.0
-    assert np.isfinite(answer[0]).all()
+    assert np.isfinite(answer.values).all()
 
 
 def test_faults_of_a_batch_are_told_by_line(page) -> None:

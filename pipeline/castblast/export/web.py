@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from castblast.bands import THROW_FACTOR, THROW_SD, throw_band_factor
+from castblast.bands import THROW_FACTOR, THROW_SD, prediction_factor, throw_band_factor
 from castblast.design import COMPLETED, rules_as_data
 from castblast.errors import SpecError
 from castblast.export.answers import Answers
@@ -88,6 +88,7 @@ def _facts(network: Network, histories: Mapping[str, Any] | None) -> dict[str, A
     return {
         "explosives": {name: _explosive(name) for name in network.explosives},
         "throw": _throw(network),
+        "explosionPressureFactor": prediction_factor("explosion_pressure"),
         # What follows from other inputs is completed, as `predict` does.
         "held": {n: v for n, v in held.items() if n in VARIABLES and n not in COMPLETED},
         "rule": rules_as_data(),

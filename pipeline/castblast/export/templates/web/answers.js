@@ -55,7 +55,11 @@ export function resultsOf(design) {
     exact("powder_factor", "powder_factor", "Powder factor", charge / rock, "Geometry, exact");
     exact("cj_pressure", "explosion_pressure", "CJ pressure", explosive.cjPressure, "Explosive data, exact");
     if (full.charge_diameter === full.hole_diameter) {
-      exact("explosion_pressure", "explosion_pressure", "Explosion pressure", explosive.explosionPressure, "Explosive data, exact");
+      const [value, factor] = [explosive.explosionPressure, facts.explosionPressureFactor];
+      rows.push({
+        key: "explosion_pressure", variable: "explosion_pressure", title: "Explosion pressure", exact: false,
+        value, lower: value / factor, upper: value * factor, note: "",
+      });
     }
   }
   return { rows, full, domain: answer.domain, offending: inputNames.filter((_, i) => answer.offending[i]), score: answer.score };

@@ -42,7 +42,7 @@ export const shownValue = (row, system) => withUnit(row.variable, row.value, sys
 /** Ends of the band of a result: two figures where they lie far apart. */
 export function shownEnds({ variable, lower, upper }, system) {
   if (!Number.isFinite(lower)) return "no band is stated";
-  const count = upper > 1.5 * lower ? 2 : 3;
+  const count = upper > 1.9 * lower ? 2 : 3;
   return `${digits(lower * unitOf(variable, system).factor, count)} to ${withUnit(variable, upper, system, count)}`;
 }
 
