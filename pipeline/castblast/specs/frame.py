@@ -18,6 +18,10 @@ _STEP = math.radians(0.1)
 _FIT = 1.02
 
 
+#: A place in any grid on the ground; bench files and columns of tables.
+GRID_PLACE = QuantityIn("m", -1e8, 1e8)
+
+
 class FrameSpec(Spec):
     """Place and direction of a bench in a grid.
 
@@ -30,8 +34,8 @@ class FrameSpec(Spec):
         of it.
     """
 
-    easting: Annotated[float, QuantityIn("m", -1e8, 1e8)]
-    northing: Annotated[float, QuantityIn("m", -1e8, 1e8)]
+    easting: Annotated[float, GRID_PLACE]
+    northing: Annotated[float, GRID_PLACE]
     bearing: Annotated[float, QuantityIn("rad", 0.0, 2.0 * math.pi)] = 0.5 * math.pi
 
     def to_bench(self, place: FloatArray) -> FloatArray:

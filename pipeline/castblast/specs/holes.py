@@ -14,7 +14,7 @@ from castblast.muckpile.bench import Bench, assign_blocks, bench_outline, block_
 from castblast.muckpile.outline import depth_inside
 from castblast.muckpile.particles import FloatArray, IntArray
 from castblast.specs.firing import THROW_AZIMUTH, THROW_ELEVATION
-from castblast.specs.frame import FrameSpec, suggest_frame
+from castblast.specs.frame import GRID_PLACE, FrameSpec, suggest_frame
 from castblast.specs.quantity import QuantityIn, VariableIn
 from castblast.specs.table import ID_HEADS, Form, Table, read_table
 from castblast.specs.tie_up import firing_times
@@ -27,8 +27,8 @@ _TOO_CLOSE = 0.25
 _A_FEW = 3
 _FORM = Form(
     columns={
-        "x": "m",
-        "y": "m",
+        "x": GRID_PLACE,
+        "y": GRID_PLACE,
         "delay": QuantityIn("s", 0.0, 60.0),
         "connector_delay": QuantityIn("s", 0.0, 10.0),
         "velocity": QuantityIn("m s-1", 0.0, 100.0),

@@ -18,7 +18,7 @@ from castblast.errors import SpecError
 from castblast.muckpile.bench import Bench
 from castblast.muckpile.ore import OrePolygon
 from castblast.muckpile.particles import FloatArray
-from castblast.specs.frame import FrameSpec
+from castblast.specs.frame import GRID_PLACE, FrameSpec
 from castblast.specs.loading import Label, Spec, load_spec, make_spec
 from castblast.specs.place import extent, place_faults
 from castblast.specs.quantity import QuantityIn
@@ -26,7 +26,7 @@ from castblast.specs.table import Form, read_table
 
 #: Grades are numbers in whatever unit the user thinks in, and as large as they like.
 _FORM = Form(
-    columns={"x": "m", "y": "m", "grade": QuantityIn("1", lower=0.0)},
+    columns={"x": GRID_PLACE, "y": GRID_PLACE, "grade": QuantityIn("1", lower=0.0)},
     required=("name", "x", "y"),
     texts=("name",),
     aliases={"easting": "x", "northing": "y"},
