@@ -14,6 +14,7 @@ import yaml
 from castblast.errors import SpecError
 from castblast.muckpile.case import CastCase, CastResult
 from castblast.muckpile.solver import run_cast
+from castblast.muckpile.terrain import heightmap
 from castblast.muckpile.walls import ground_height
 from castblast.specs.bench import load_bench
 from castblast.stages import muckpile
@@ -118,6 +119,49 @@ def test_ground_with_pits_narrower_than_balls_is_refused(tmp_path: Path, packing
     content["ground"]["smooth"] = "2 m"
     bench.write_text(yaml.safe_dump(content))
     assert run_muckpile(bench, tmp_path / "out", **options).files
+
+
+def test_a_surface_that_faces_down_is_turned_and_said(
+    tmp_path: Path, packings: Path, ends: list[tuple[CastCase, CastResult]]
+) -> None:
+    """One facet doubled, all turned: bit for bit the cast onto the sound surface, and its energy.
+
+    Balls on the back of a surface were pushed through it, at 22 times the energy of the blast.
+    """
+    trimesh = pytest.importorskip("trimesh")
+    bank = heightmap(X + 3.0, Y, np.tile(0.5 * X, (len(Y), 1))).corner
+    down = np.concatenate([bank, bank[[7]]])[:, ::-1]
+    documents = []
+    for name, corner in (("sound.stl", bank), ("down.stl", down)):
+        mesh = trimesh.Trimesh(corner.reshape(-1, 3), np.arange(3 * len(corner)).reshape(-1, 3))
+        mesh.export(tmp_path / name, file_type="stl_ascii")
+        out = tmp_path / name.removesuffix(".stl")
+        run = run_muckpile(
+            written(tmp_path, ground=name), out, threads=1, packings=packings, velocity="6 m/s"
+        )
+        documents.append(run.document)
+        assert run.remarks[: len(run.document.get("ground_remarks", []))] == run.document.get(
+            "ground_remarks", []
+        )
+    sound, turned = documents
+    assert "ground_remarks" not in sound
+    assert turned["ground_remarks"] == [
+        f"{tmp_path / 'down.stl'}: 1 facet lay on another with the same corners (facet "
+        f"{len(bank)}): dropped",
+        f"{tmp_path / 'down.stl'}: {len(bank)} facets faced away from the balls (facet 0, 1, 2 "
+        f"and {len(bank) - 3} more): turned",
+    ]
+    one, two = (result.particles for _, result in ends)
+    np.testing.assert_array_equal(one.position, two.position)
+    assert abs(turned["ledger"]["residual"]) < 0.01
+
+
+def test_balls_in_the_grid_of_the_mine_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "balls.csv").write_text(
+        "x,y,z,radius\n45231,73892,598,0.5\n45232.5,73892,598,0.5\n"
+    )
+    with pytest.raises(SpecError, match=r"km from the bench .* move all balls by \[-45234 m, "):
+        run_muckpile(written(tmp_path, balls="balls.csv"), tmp_path / "out", threads=1)
 
 
 def test_hash_of_a_bench_covers_the_files_that_it_names(tmp_path: Path) -> None:

@@ -103,7 +103,8 @@ def offset_onto(where: Extent, bench: Bench | None = None) -> FloatArray:
     if bench is None:
         return -np.round(where.low)
     middle = np.array([-bench.width, bench.length]) / 2.0
-    return np.asarray(np.round(middle - (where.low + where.high)[:2] / 2.0))
+    aside = np.round(middle - (where.low + where.high)[:2] / 2.0)
+    return np.concatenate([aside, -np.round(where.low[2:])])
 
 
 def _size_fault(size: float, side: float, inside: bool) -> str:

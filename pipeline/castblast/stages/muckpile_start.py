@@ -14,12 +14,13 @@ from castblast.files import write_with
 from castblast.kernel import source_hash
 from castblast.muckpile.bench import Bench, bench_outline
 from castblast.muckpile.packing import count_of, fill_bench
-from castblast.muckpile.particles import particles_at_rest
+from castblast.muckpile.particles import Particles, particles_at_rest
 from castblast.muckpile.sizes import Sizes
 from castblast.progress import ProgressCallback
 from castblast.specs.ball_files import read_balls
 from castblast.specs.balls import ChosenSizes, choose_sizes
 from castblast.specs.bench import BenchSpec
+from castblast.specs.place import extent, place_faults
 from castblast.stages.muckpile_memory import require_memory
 from castblast.stages.muckpile_plan import Plan
 from castblast.stages.muckpile_results import Start
@@ -67,6 +68,7 @@ def make_start(
                 f"{path}: block: {balls.block.max()} of ball {int(balls.block.argmax())}: the "
                 f"plan has the blocks 0 to {len(plan.delay) - 1}"
             )
+        _require_near(path, balls, bench)
         return Start(balls), None
     try:
         chosen = choose_sizes(spec.balls, bench, spec.design() or {})
@@ -83,6 +85,13 @@ def make_start(
         progress(1.0, "packing of an earlier run")
     block = plan.blocks_of(start.balls.position, bench)
     return start._replace(balls=start.balls._replace(block=block)), chosen
+
+
+def _require_near(path: Path, balls: Particles, bench: Bench) -> None:
+    """Refuse balls in another grid, where they would fall beside all walls."""
+    onto = "move all balls by {offset}"
+    if faults := place_faults(extent(balls.position), bench, onto, inside=True):
+        raise SpecError("\n".join(f"{path}: {fault}" for fault in faults))
 
 
 def _pack(
