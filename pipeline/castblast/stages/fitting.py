@@ -17,6 +17,7 @@ from castblast.errors import DatasetError, SpecError
 from castblast.extras import missing_libraries, missing_line, require
 from castblast.files import write_csv, write_text
 from castblast.progress import ProgressCallback, part, silent
+from castblast.reading import read_json, read_text
 from castblast.stages.jobs import Job, available_cores, run_jobs
 
 if TYPE_CHECKING:
@@ -192,7 +193,11 @@ def kept_fits(folder: Path) -> tuple[Path, list[ModelSpec]]:
     if not note.is_file() or not found:
         message = f"{folder}: holds no fits of castblast train; give the dataset instead"
         raise SpecError(message)
-    dataset = os.path.normpath(folder / note.read_text(encoding="utf-8").strip())
+    place = read_text(note).strip()
+    if not place.isprintable():
+        message = f"{note}: holds no path of a dataset; give the dataset instead"
+        raise SpecError(message)
+    dataset = os.path.normpath(folder / place)
     return Path(dataset), found
 
 
@@ -200,11 +205,11 @@ def _spec_of(path: Path) -> ModelSpec:
     """Spec in the document of a fit."""
     from castblast.specs.model import make_model_spec
 
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))["spec"]
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+    document = read_json(path)
+    content = document.get("spec") if isinstance(document, dict) else None
+    if content is None:
         message = f"{path}: holds no spec of a model; run castblast train again"
-        raise SpecError(message) from None
+        raise SpecError(message)
     return make_model_spec(content, f"{path}: spec", path.parent)
 
 

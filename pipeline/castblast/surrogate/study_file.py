@@ -76,5 +76,5 @@ def _mend(journal: Path) -> None:
 def _is_record(line: bytes) -> bool:
     try:
         return line.startswith(_RECORD) and isinstance(json.loads(line), dict)
-    except ValueError:
+    except (ValueError, RecursionError):
         return False

@@ -210,7 +210,9 @@ def _open_study(optuna: Any, journal: Path, identity: Mapping[str, str]) -> Any:
         backend = JournalFileBackend(str(journal), lock_obj=JournalFileOpenLock(str(journal)))
         storage = JournalStorage(backend)
         names = [entry.study_name for entry in optuna.get_all_study_summaries(storage)]
-    except (ValueError, KeyError, TypeError, AssertionError) as fault:
+    except (
+        ValueError, KeyError, TypeError, AttributeError, AssertionError, RecursionError,
+    ) as fault:  # fmt: skip
         message = f"{journal}: is no journal of a study, or a damaged one ({type(fault).__name__})"
         raise SpecError(message) from None
     if not names:
