@@ -39,7 +39,8 @@ OPTIONAL = frozenset({"outer_radius", "zones"})
 #: Relative margin of a bound: 60 deg must pass a bound of 60 deg.
 _BOUND_MARGIN = 1e-12
 _INPUTS = {v.name: v for v in INPUTS}
-_FIELD = re.compile(r"\{(?:([\d.]+)\*)?(\w+)(?::(\w+))?\}")
+#: A field of a message: factor, input, and the input in whose unit it is shown.
+MESSAGE_FIELD = re.compile(r"\{(?:([\d.]+)\*)?(\w+)(?::(\w+))?\}")
 
 
 class Completion(NamedTuple):
@@ -395,4 +396,4 @@ def _say_rule(rule: DesignRule, full: Mapping[str, FloatArray], row: int) -> str
         factor, name, as_name = field.groups()
         return VARIABLES[as_name or name].show(float(factor or 1.0) * float(full[name][row]))
 
-    return _FIELD.sub(shown, rule.message)
+    return MESSAGE_FIELD.sub(shown, rule.message)

@@ -431,7 +431,7 @@ def test_workbook_answers_what_is_typed(network: Network) -> None:
     openpyxl = pytest.importorskip("openpyxl")
     book = openpyxl.load_workbook(BytesIO(TARGETS["excel"].write(network)["model.xlsx"]))
     book["Predict"]["B4"] = "heavy_anfo"
-    for row, value in zip((6, 7, 8), (12.0, 5.0, 50.0), strict=True):
+    for row, value in zip((6, 7, 8), (12.0, 5.0, 20.0), strict=True):
         book["Predict"].cell(row, 2, value)
     changed = BytesIO()
     book.save(changed)
@@ -440,7 +440,7 @@ def test_workbook_answers_what_is_typed(network: Network) -> None:
     except NotVerifiedError as reason:
         pytest.skip(str(reason))
     cells = {row[0]: row[1:] for row in found.iter_rows(values_only=True) if row[0]}
-    truth = answers(network, np.array([[12.0, 5.0, 50.0]]), np.array([1]))
+    truth = answers(network, np.array([[12.0, 5.0, 20.0]]), np.array([1]))
     assert cells["Domain"][0] == "outside"
     assert cells["Inputs at fault"][0] == "bench_height burden"
     assert cells["burden at the crest"][4] == "at fault"
@@ -448,6 +448,26 @@ def test_workbook_answers_what_is_typed(network: Network) -> None:
     value, lower, upper, unit = cells["final velocity of the burden"][:4]
     assert value == pytest.approx(truth.values[0, 0], rel=1e-13)
     assert (lower, upper, unit) == ("unknown", "unknown", "m s-1")
+
+
+def test_a_workbook_refuses_what_no_bench_can_hold(network: Network) -> None:
+    """14 m of charge in 12 m of bench, calculated by LibreOffice: the reason, and no value."""
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.load_workbook(BytesIO(TARGETS["excel"].write(network)["model.xlsx"]))
+    for row, value in zip((6, 7, 8), (12.0, 14.0, 3.0), strict=True):
+        book["Predict"].cell(row, 2, value)
+    changed = BytesIO()
+    book.save(changed)
+    try:
+        found = recalculated(changed.getvalue())["Predict"]
+    except NotVerifiedError as reason:
+        pytest.skip(str(reason))
+    cells = {row[0]: row[1:] for row in found.iter_rows(values_only=True) if row[0]}
+    assert cells["Domain"][0] == "impossible"
+    assert cells["Design"][0] == (
+        "charge length 14 m leaves no room for stemming: at most the bench height of 12 m."
+    )
+    assert cells["final velocity of the burden"][0] == "no value"
 
 
 def test_a_workbook_says_which_band_is_which(network: Network) -> None:

@@ -26,6 +26,7 @@ from castblast.export.sheet_block import (
     span,
     write_block,
 )
+from castblast.export.sheet_design import write_refusals
 from castblast.extras import require
 from castblast.network import Network
 
@@ -58,8 +59,10 @@ def to_excel(network: Network) -> Files:
     working, check = book.create_sheet("Working"), book.create_sheet("Check")
     constants = Constants(book.create_sheet("Network"))
     block = _working(network, constants, working)
+    cells = {name: f"${letter(i)}${TOP}" for i, name in enumerate(network.input_names, 2)}
+    reasons = write_refusals(network, working, TOP + 3, cells)
     _check(network, constants, check)
-    _predict(network, predict, block, constants)
+    _predict(network, predict, block, constants, reasons)
     return {"model.xlsx": _same_bytes(book), "lookup.csv": lookup_csv(network).encode()}
 
 
@@ -103,7 +106,9 @@ def _check(network: Network, constants: Constants, sheet: Worksheet) -> None:
     sheet.freeze_panes = sheet.cell(TOP, k + 2)
 
 
-def _predict(network: Network, sheet: Worksheet, block: Block, constants: Constants) -> None:
+def _predict(
+    network: Network, sheet: Worksheet, block: Block, constants: Constants, reasons: str
+) -> None:
     from openpyxl.styles import Font
 
     document = compact(network)
@@ -119,16 +124,19 @@ def _predict(network: Network, sheet: Worksheet, block: Block, constants: Consta
     domain = f"Working!${letter(block.domain)}${TOP}"
     sheet.cell(bottom + 1, 1, "Domain")
     words = f'IF({domain}=0,"inside",IF({domain}=1,"unusual together","outside"))'
-    sheet.cell(bottom + 1, 2, f'=IFERROR({words},"outside")')
+    possible = f'$B${bottom + 3}="possible"'
+    sheet.cell(bottom + 1, 2, f'=IF({possible},IFERROR({words},"outside"),"impossible")')
+    sheet.cell(bottom + 3, 1, "Design")
+    sheet.cell(bottom + 3, 2, f'=IF({reasons}="","possible",{reasons})')
     state = f"$B${bottom + 1}"
     sheet.cell(bottom + 2, 1, "Inputs at fault")
     flags = [f"Working!${letter(block.offending + i)}${TOP}" for i in range(len(network.inputs))]
     texts = [f'IF({flag}=1,{in_formula(name + " ")},"")'
              for flag, name in zip(flags, network.input_names, strict=True)]  # fmt: skip
     sheet.cell(bottom + 2, 2, "=TRIM(" + "&".join(texts) + ")")
-    _results(document, sheet, block, bottom + 4, state)
+    _results(document, sheet, block, bottom + 5, state)
     _colours(sheet, state)
-    last = bottom + 8 + len(document["outputs"])
+    last = bottom + 9 + len(document["outputs"])
     sheet.cell(last, 1, "Self-check: largest relative deviation on the golden rows")
     sheet.cell(last, 2, "=Check!$B$1").number_format = "0.0E+00"
     sheet.page_setup.orientation = "landscape"
@@ -195,6 +203,7 @@ def _results(
             text = f'IFERROR({cell},"{"no value" if i == 2 else "not stated"}")'
             if i > 2:
                 text = f'IF({state}="outside","unknown",{text})'
+            text = f'IF({state}="impossible","no value",{text})'
             sheet.cell(row, i, f"={text}").number_format = "0.0000"
         put(sheet, row, 5, column["shown_unit"])
     bottom = top + 1 + len(document["outputs"])
@@ -209,7 +218,7 @@ def _colours(sheet: Worksheet, state: str) -> None:
     from openpyxl.styles import PatternFill
 
     for word, colour in (("inside", "C6E7C8"), ("unusual together", "FFE6A8"),
-                         ("outside", "F6C1BC")):  # fmt: skip
+                         ("outside", "F6C1BC"), ("impossible", "F6C1BC")):  # fmt: skip
         fill = PatternFill("solid", bgColor=colour, fgColor=colour)
         rule = CellIsRule(operator="equal", formula=[f'"{word}"'], fill=fill)
         sheet.conditional_formatting.add(state.replace("$", ""), rule)
