@@ -36,6 +36,7 @@ BASIS = "prior: not calibrated on your blasts"
 BAND_TITLE = "prediction band"
 #: What it means, for people, with its basis.
 BAND_WORDS = f"prediction band: 5th to 95th percentile of blasts; {BASIS}"
+BAND_SENTENCE = f"P{BAND_WORDS[1:]}."
 
 
 class Prior(NamedTuple):

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from castblast.bands import BAND_WORDS
+from castblast.bands import BAND_SENTENCE
 from castblast.export.lookup import lookup_csv
 from castblast.export.plain import Files, compact
 from castblast.export.sheet_block import (
@@ -207,7 +207,7 @@ def _results(
             sheet.cell(row, i, f"={text}").number_format = "0.0000"
         put(sheet, row, 5, column["shown_unit"])
     bottom = top + 1 + len(document["outputs"])
-    sheet.cell(bottom, 1, f"{BAND_WORDS[0].upper()}{BAND_WORDS[1:]}.")
+    sheet.cell(bottom, 1, BAND_SENTENCE)
     sheet.cell(
         bottom + 1, 1, "Network band: 95 % of what the simulator would give; not of a blast."
     )

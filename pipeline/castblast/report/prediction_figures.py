@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 
 from castblast.bands import BAND_TITLE
@@ -47,6 +48,7 @@ def draw_velocity_curves(path: Path, title: str, curves: Sequence[VelocityCurve]
         axis.plot(curve.simulated_burden, curve.simulated_velocity, "o", color=colour, markersize=4)
     axis.set_yscale("log")
     axis.yaxis.set_major_formatter("{x:g}")
+    axis.yaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
     axis.yaxis.set_minor_formatter("{x:g}")
     axis.plot([], [], "o", color="#222222", markersize=4, label="physics")
     axis.fill_between([], [], [], color="#222222", alpha=0.15, linewidth=0, label=BAND_TITLE)

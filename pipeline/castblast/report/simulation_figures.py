@@ -78,10 +78,13 @@ def draw_simulation(
     _draw_hole(axes[0, 1], document, near)
     _draw_burden(axes[1, 0], document, burden)
     _draw_ledger(axes[1, 1], document)
+    pressure, speed = (
+        f"{show_value(name, document[name])} {unit} ({show_band(name, document[name])})"
+        for name, unit in (("equilibrium_pressure", "MPa"), ("burden_velocity", "m/s"))
+    )
     figure.suptitle(
-        f"{document['explosive']}: {document['equilibrium_pressure'] * 1e-6:.0f} MPa at rest, "
-        f"burden velocity {show_value('burden_velocity', document['burden_velocity'])} m/s "
-        f"({show_band('burden_velocity', document['burden_velocity'])}, {BASIS})",
+        f"{document['explosive']}: {pressure} at rest, burden velocity {speed}\n"
+        f"in brackets the prediction band, {BASIS}",
         fontsize=11,
     )
     return save_figure(figure, path)
@@ -117,7 +120,7 @@ def _draw_burden(axis: Any, document: Mapping[str, Any], burden: BurdenHistory) 
     other.semilogy(time, burden.history_pressure * 1e-6, color=ORANGE, label="gas pressure")
     other.set_ylabel("pressure [MPa]")
     lines = axis.get_lines() + other.get_lines()
-    axis.legend(lines, [line.get_label() for line in lines], loc="center right")
+    axis.legend(lines, [line.get_label() for line in lines], loc="upper center")
 
 
 def _draw_ledger(axis: Any, document: Mapping[str, Any]) -> None:

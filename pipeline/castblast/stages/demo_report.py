@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from castblast import __version__
-from castblast.bands import BAND_TITLE, BAND_WORDS, show_band, show_value
+from castblast.bands import BAND_SENTENCE, BAND_TITLE, show_band, show_value
 from castblast.report.html import Picture, Section, Table, write_report
 from castblast.stages.dataset import describe_dataset
 from castblast.stages.muckpile_results import metric_rows
@@ -122,7 +122,7 @@ def _prediction(folder: Path) -> Section:
     inputs = ", ".join(f"{n} {VARIABLES[n].show(v)}" for n, v in document["inputs"].items())
     return Section(
         "Prediction against physics",
-        paragraphs=[f"Design: {document['explosive']}, {inputs}.", f"{BAND_WORDS}."],
+        paragraphs=[f"Design: {document['explosive']}, {inputs}.", BAND_SENTENCE],
         tables=[
             Table(
                 ("quantity", "surrogate", BAND_TITLE, "physics", "network band", "deviation"), rows
