@@ -161,7 +161,7 @@ def test_faulty_balls(tmp_path: Path, arrays: dict[str, object], line: str) -> N
 
 @pytest.mark.parametrize(
     ("content", "line"),
-    [(b"", "no readable .npz"), (b"PK\x03\x04cut", "no readable .npz"), (None, "no such file")],
+    [(b"", "damaged"), (b"PK\x03\x04cut", "damaged"), (None, "no such file")],
 )
 def test_files_that_are_no_npz(tmp_path: Path, content: bytes | None, line: str) -> None:
     path = tmp_path / "balls.npz"
@@ -174,7 +174,7 @@ def test_files_that_are_no_npz(tmp_path: Path, content: bytes | None, line: str)
 def test_a_truncated_npz_is_refused(tmp_path: Path) -> None:
     path = balls_file(tmp_path, x=GRID, r=RADII)
     path.write_bytes(path.read_bytes()[:400])
-    with pytest.raises(SpecError, match=r"no readable \.npz"):
+    with pytest.raises(SpecError, match="damaged"):
         read_balls(path)
 
 

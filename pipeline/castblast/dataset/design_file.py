@@ -23,6 +23,7 @@ from castblast.dataset.design import Design, row_faults
 from castblast.dataset.simulation import Columns, FloatArray, Simulator
 from castblast.errors import SpecError, nearest_name
 from castblast.files import write_text
+from castblast.names import cell_text
 from castblast.specs.catalogue import resolve_explosive
 from castblast.specs.recipe import SPLIT_NAMES, Recipe, VariableSpec
 from castblast.specs.table import ID_HEADS, Form, Table, read_table
@@ -41,7 +42,7 @@ def write_design_file(
     )
     values = np.stack([columns[spec.name] for spec in recipe.sampled], axis=1)
     for row, name in zip(values.tolist(), explosive, strict=True):
-        writer.writerow([*map(repr, row), name])
+        writer.writerow([*map(repr, row), cell_text(name)])
     return write_text(path, buffer.getvalue())
 
 

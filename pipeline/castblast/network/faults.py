@@ -43,16 +43,20 @@ def shell_faults(shell: Shell) -> list[str]:
         if not least < entry.lower <= entry.upper < np.inf:
             faults.append(f"{entry.name}: domain {entry.lower!r} to {entry.upper!r} is no range")
     faults += [
-        f"{column.name}: the error band must be finite and not negative"
+        f"{column.name}: the relative error band must lie between 0 and 100"
         for column in shell.outputs
-        if not 0.0 <= column.relative_band < np.inf
+        if not 0.0 <= column.relative_band <= 100.0
     ]
     for rule in shell.constraints:
         faults += _unknown_inputs(f"rule '{rule.label}'", rule.coefficients, shell)
+        if not np.isfinite([rule.lower, *rule.coefficients.values()]).all():
+            faults.append(f"rule '{rule.label}': its numbers must be finite")
     for column in shell.derived:
         faults += _unknown_inputs(column.name, column.coefficients, shell)
-    if not _has_codes(shell):
-        faults.append("one row of codes per explosive is needed")
+        if not np.isfinite(list(column.coefficients.values())).all():
+            faults.append(f"{column.name}: its coefficients must be finite")
+    if not _has_codes(shell) or not np.isfinite(shell.codes).all():
+        faults.append("one row of codes per explosive is needed, of finite numbers")
     if shell.density is not None:
         faults += _density_faults(shell.density, len(shell.inputs))
     return faults + _golden_faults(shell)
@@ -125,6 +129,8 @@ def _golden_faults(shell: Shell) -> list[str]:
         golden.outputs.shape != (rows, len(shell.outputs))
     ):
         faults.append("golden rows do not have the shape of the inputs and outputs")
+    if not (np.isfinite(golden.inputs).all() and np.isfinite(golden.outputs).all()):
+        faults.append("golden rows must be finite")
     if not set(golden.explosives) <= set(shell.explosives):
         faults.append("golden rows name an unknown explosive")
     return faults

@@ -19,6 +19,7 @@ from castblast.muckpile.bench import Bench, check_bench, polygon_bench
 from castblast.muckpile.contact import ContactLaw, DashpotMode
 from castblast.muckpile.outline import polygon_area
 from castblast.muckpile.packing import check_packing
+from castblast.names import shortened
 from castblast.resources import find_spec
 from castblast.specs.balls import BallsSpec
 from castblast.specs.firing import Direction, FiringPlan
@@ -42,12 +43,14 @@ def _read_corners(value: object) -> tuple[tuple[float, float], ...]:
     corners, faults = [], []
     for k, corner in enumerate(value):
         if not isinstance(corner, list | tuple) or len(corner) != 2:
-            faults.append(f"corner {k + 1}: {corner}: two lengths are needed, such as [-3 m, 0 m]")
+            faults.append(
+                f"corner {k + 1}: {shortened(corner)}: two lengths are needed, such as [-3 m, 0 m]"
+            )
             continue
         try:
             corners.append((convert(corner[0], "m"), convert(corner[1], "m")))
         except QuantityError as fault:
-            faults.append(f"corner {k + 1}: {corner}: {fault}")
+            faults.append(f"corner {k + 1}: {shortened(corner)}: {fault}")
     if faults:
         raise QuantityError("; ".join(faults))
     return tuple(corners)
@@ -210,12 +213,14 @@ def _read_design(value: object) -> dict[str, Any]:
         if name in _FROM_BENCH:
             faults.append(f"{name}: is taken from 'bench'")
         elif name not in VARIABLES:
-            faults.append(f"{name}: unknown variable{nearest_name(str(name), VARIABLES)}")
+            faults.append(
+                f"{shortened(name)}: unknown variable{nearest_name(str(name), VARIABLES)}"
+            )
         else:
             try:
                 design[name] = convert_variable(name, written)
             except QuantityError as fault:
-                faults.append(f"{name}: {written}: {fault}")
+                faults.append(f"{name}: {shortened(written)}: {fault}")
     if faults:
         raise QuantityError("; ".join(faults))
     return design

@@ -9,6 +9,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from castblast.errors import SpecError, nearest_name
+from castblast.names import shortened
 from castblast.resources import find_spec
 from castblast.specs.loading import Spec, load_spec
 from castblast.specs.quantity import parse_variable
@@ -61,7 +62,9 @@ def split_assignments(assignments: Iterable[str]) -> dict[str, str]:
         name, sign, value = text.partition("=")
         name = name.strip().replace("-", "_")
         if not sign or not value.strip():
-            faults.append(f'--set {text}: write NAME="VALUE UNIT", e.g. --set burden="3 m"')
+            faults.append(
+                f'--set {shortened(text)}: write NAME="VALUE UNIT", e.g. --set burden="3 m"'
+            )
         elif name in values:
             faults.append(f"--set {name}: given twice")
         else:
@@ -87,7 +90,7 @@ def parse_values(
     for name, value in values.items():
         if name not in allowed:
             hint = nearest_name(name, allowed)
-            faults.append(f"{where}: {name}: no such input{hint}")
+            faults.append(f"{where}: {shortened(name)}: no such input{hint}")
             continue
         try:
             parsed[name] = parse_variable(name, value, f"{where}: {name}")

@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 
 from castblast.errors import SpecError, nearest_name
+from castblast.names import shortened
 from castblast.resources import resource
 from castblast.specs.loading import read_yaml
 
@@ -74,5 +75,6 @@ def find_explosive(name_or_path: str | Path) -> Path:
         return resource(FOLDER) / f"{name}.yaml"
     known = ", ".join(explosive_names())
     hint = nearest_name(spelled(text), (*explosive_names(), *explosive_aliases()))
-    message = f"unknown explosive '{text}'{hint or ';'} known: {known}; or the path of a YAML file"
+    asked = f"unknown explosive '{shortened(text)}'{hint or ';'}"
+    message = f"{asked} known: {known}; or the path of a YAML file"
     raise SpecError(message)

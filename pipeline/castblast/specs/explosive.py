@@ -35,6 +35,7 @@ from castblast.explosive.isentrope import (
 )
 from castblast.explosive.remedies import remedies
 from castblast.explosive.table_checks import check_table
+from castblast.names import shortened
 from castblast.specs.catalogue import find_explosive
 from castblast.specs.loading import Label, Spec, load_spec
 from castblast.specs.quantity import QuantityError, QuantityIn, convert
@@ -48,13 +49,15 @@ def _read_table(value: object) -> tuple[tuple[float, ...], ...]:
     rows, faults = [], []
     for number, row in enumerate(value, start=1):
         if not isinstance(row, list) or len(row) not in (2, 3) or len(row) != len(value[0]):
-            faults.append(f"row {number} ({row}): [V, P] or [V, P, E] is needed, the same in all")
+            faults.append(
+                f"row {number} ({shortened(row)}): [V, P] or [V, P, E] is needed, the same in all"
+            )
             continue
         try:
             units = ("1", "Pa", "Pa")[: len(row)]
             rows.append(tuple(_si(cell, unit) for cell, unit in zip(row, units, strict=True)))
         except QuantityError as fault:
-            faults.append(f"row {number} ({row}): {fault}")
+            faults.append(f"row {number} ({shortened(row)}): {fault}")
     if faults:
         raise QuantityError("; ".join(faults[:5]))
     return tuple(rows)

@@ -112,6 +112,9 @@ def _read_npz(path: Path, factor: float) -> Heights:
     if height.size > MOST_HEIGHTS:
         raise SpecError(f"{path}: {height.size:,} heights; at most {MOST_HEIGHTS:,}: coarsen it")
     if needed == _AXIS_KEYS:
+        odd = [key for key in _AXIS_KEYS if stored[key].ndim != 1]
+        if odd:
+            raise SpecError(f"{path}: {odd[0]}: shape {stored[odd[0]].shape}; (n,) is needed")
         x, y = (np.asarray(stored[key], dtype=np.float64) * factor for key in _AXIS_KEYS)
         return Heights(x, y, height, _rounding(stored, factor))
     dx = stored["dx"].item()

@@ -245,7 +245,10 @@ def _broken(where: str, fault: yaml.YAMLError) -> str:
 def _fault_lines(fault: ValidationError, model: type[BaseModel]) -> list[str]:
     lines = []
     for error in fault.errors(include_url=False):
-        place = tuple(part for part in error["loc"] if _is_written(part))
+        # An unknown key may look like the name of a validator, and is named all the same.
+        own = len(error["loc"]) - 1 if error["type"] == "extra_forbidden" else -1
+        loc = enumerate(error["loc"])
+        place = tuple(part for i, part in loc if i == own or _is_written(part))
         field = _field_path(place)
         what = _describe(error["type"], error["msg"], error.get("ctx", {}), place, model)
         shown = "" if error["type"] in ("missing", "extra_forbidden") else _show(error["input"])
@@ -264,7 +267,7 @@ def _field_path(place: tuple[int | str, ...]) -> str:
         if isinstance(part, int):
             path += f"[{shortened(part)}]"
         else:
-            path += f".{shortened(part)}" if path else shortened(part)
+            path += f".{shortened(part)}" if path else shortened(part) or "''"
     return path
 
 
