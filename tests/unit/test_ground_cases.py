@@ -215,6 +215,29 @@ def test_thirty_thousand_points_take_bounded_memory(tmp_path: Path) -> None:
         read_heights(tmp_path / "c.xyz", spacing=0.01)
 
 
+def test_a_fine_grid_is_thinned(tmp_path: Path) -> None:
+    """Linear in between, missing heights stay so; more than can be searched is one line."""
+    x, y = np.arange(0.0, 30.25, 0.25), np.arange(-4.0, 20.25, 0.25)
+    height = 0.2 * x[None, :] - 0.1 * y[:, None] + 3.0
+    height[:3, :5] = np.nan
+    np.savez(tmp_path / "g.npz", x=x, y=y, height=height)
+    found = read_heights(tmp_path / "g.npz", spacing=1.6)
+    assert "interpolated on a grid of 1.6 m (16 x 19 heights)" in found.remarks[0]
+    plane = 0.2 * found.x[None, :] - 0.1 * found.y[:, None] + 3.0
+    known = np.isfinite(found.height)
+    np.testing.assert_allclose(found.height[known], plane[known], atol=1e-12)
+    assert not known[0, 0]
+    same = read_heights(tmp_path / "g.npz", spacing=0.25)
+    np.testing.assert_array_equal(np.isnan(same.height[4:, 6:]), False)
+    np.testing.assert_allclose(same.height[4:, 6:], height[4:, 6:], atol=1e-12)
+    with pytest.raises(SpecError, match=r"spacing: 40 m: gives 1 x 1 heights over 30 x 24 m"):
+        read_heights(tmp_path / "g.npz", spacing=40.0)
+    np.savez(tmp_path / "g.npz", x0=0.0, y0=0.0, dx=0.1, height=np.ones((1000, 900)))
+    with pytest.raises(SpecError, match=r"900,000 heights; at most 500,000 .* 'spacing: 0.15 m'"):
+        read_heights(tmp_path / "g.npz")
+    assert read_heights(tmp_path / "g.npz", spacing=0.2).height.size == 500 * 450
+
+
 def test_points_on_one_line_are_no_surface(tmp_path: Path) -> None:
     (tmp_path / "l.csv").write_text("x,y,z\n" + "".join(f"{k},{k},1\n" for k in range(20)))
     with pytest.raises(SpecError, match="lie on one line"):

@@ -64,7 +64,7 @@ class GroundSpec(Spec):
         The outermost heights go on outwards so far, such as half a cell of a surface that is given
         by the middles of its cells.
     spacing : length, optional
-        Of the grid onto which scattered points are brought; default: that of the points.
+        Of the grid onto which heights or scattered points are brought; default: that of the file.
     mend : bool
         Corners of an STL surface that lie close together are joined, facets without height or given
         twice dropped, and those that face the wrong way turned; what was done is said. Otherwise

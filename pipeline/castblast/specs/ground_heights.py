@@ -21,8 +21,8 @@ _AXIS_KEYS = ("x", "y")
 _TEXTS = (".csv", ".txt", ".xyz", ".dat", ".asc")
 #: No place on Earth is so low, and none so high, in m: a value beyond is a mark for none.
 _DEEPEST, _HIGHEST = -9000.0, 9e4
-#: More cells make more facets than a cast can search.
-MOST_HEIGHTS = 4_000_000
+#: Most heights of a file, and of the ground: a facet takes some 5 kB as a wall, a height two.
+MOST_READ, MOST_HEIGHTS = 8_000_000, 500_000
 
 
 class Heights(NamedTuple):
@@ -53,7 +53,7 @@ def read_heights(path: Path, unit: str = "", spacing: float | None = None) -> He
     unit : str
         Unit of a file that gives none; empty: m.
     spacing : float, optional [m]
-        Of the grid onto which scattered points are brought; default: that of the points.
+        Of the grid onto which heights are brought; default: that of the file.
 
     Raises
     ------
@@ -67,10 +67,43 @@ def read_heights(path: Path, unit: str = "", spacing: float | None = None) -> He
     elif suffix not in _TEXTS:
         raise SpecError(f"{path}: heights must be in a .npz, {', '.join(_TEXTS)} file")
     elif suffix == ".asc" or is_esri_grid(path):
-        found = Heights(*read_esri_grid(path, MOST_HEIGHTS, factor))
+        found = Heights(*read_esri_grid(path, MOST_READ, factor))
     else:
-        found = Heights(*read_points(path, unit, spacing, MOST_HEIGHTS))
-    return _checked(path, found)
+        x, y, height, remarks, scattered = read_points(path, unit, spacing, MOST_HEIGHTS)
+        found = Heights(x, y, height, remarks)
+        spacing = None if scattered else spacing
+    found = _checked(path, found)
+    if spacing is not None:
+        found = _thinned(path, found, spacing)
+    if found.height.size > MOST_HEIGHTS:
+        fine = np.sqrt(np.ptp(found.x) * np.ptp(found.y) / MOST_HEIGHTS)
+        raise SpecError(
+            f"{path}: {found.height.size:,} heights; at most {MOST_HEIGHTS:,} make ground: set "
+            f"'spacing: {1.1 * fine:.2g} m', or cut the surface"
+        )
+    if missing := missing_heights(found.height):
+        found = found._replace(remarks=(*found.remarks, missing))
+    return found
+
+
+def _thinned(path: Path, found: Heights, spacing: float) -> Heights:
+    """Interpolate a grid linearly at places `spacing` [m] apart."""
+    from scipy.interpolate import RegularGridInterpolator
+
+    # A share of the spacing keeps the last place of a grid that it divides.
+    axes = [np.arange(a[0], a[-1] + 1e-6 * spacing, spacing) for a in (found.x, found.y)]
+    count = len(axes[0]) * len(axes[1])
+    if min(map(len, axes)) < 2 or count > MOST_READ:
+        raise SpecError(
+            f"{path}: spacing: {spacing:g} m: gives {len(axes[1])} x {len(axes[0])} heights over "
+            f"{np.ptp(found.x):.5g} x {np.ptp(found.y):.5g} m; at least 2 x 2 are needed"
+        )
+    x, y = (np.minimum(new, old[-1]) for new, old in zip(axes, found[:2], strict=True))
+    place = np.stack(np.meshgrid(y, x, indexing="ij"), axis=-1)
+    height = RegularGridInterpolator((found.y, found.x), found.height)(place)
+    remark = f"heights interpolated on a grid of {spacing:g} m ({len(y)} x {len(x)} heights)"
+    thin = Heights(x, y, np.asarray(height, dtype=np.float64), (*found.remarks, remark))
+    return _checked(path, thin)
 
 
 def _checked(path: Path, found: Heights) -> Heights:
@@ -85,8 +118,6 @@ def _checked(path: Path, found: Heights) -> Heights:
         )
     if faults := height_faults(found.x, found.y, height):
         raise SpecError("\n".join(f"{path}: {fault}" for fault in faults))
-    if missing := missing_heights(height):
-        remarks += (missing,)
     return Heights(found.x, found.y, height, remarks)
 
 
@@ -109,8 +140,8 @@ def _read_npz(path: Path, factor: float) -> Heights:
     height = np.asarray(stored["height"], dtype=np.float64) * factor
     if height.ndim != 2:
         raise SpecError(f"{path}: height: shape {height.shape}; (ny, nx) is needed")
-    if height.size > MOST_HEIGHTS:
-        raise SpecError(f"{path}: {height.size:,} heights; at most {MOST_HEIGHTS:,}: coarsen it")
+    if height.size > MOST_READ:
+        raise SpecError(f"{path}: {height.size:,} heights; at most {MOST_READ:,}: coarsen it")
     if needed == _AXIS_KEYS:
         odd = [key for key in _AXIS_KEYS if stored[key].ndim != 1]
         if odd:

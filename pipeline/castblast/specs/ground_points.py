@@ -28,11 +28,11 @@ _HEADS = {
     "z": ("elevation", "elev", "height", "level", "rl", "h", "z_coord", "zcoord", "altitude"),
 }
 
-_Grid = tuple[FloatArray, FloatArray, FloatArray, tuple[str, ...]]
+_Grid = tuple[FloatArray, FloatArray, FloatArray, tuple[str, ...], bool]
 
 
 def read_points(path: Path, unit: str, spacing: float | None, most: int) -> _Grid:
-    """Read points and put them onto a grid: x (nx,), y (ny,), height (ny, nx) [m], remarks.
+    """Read points onto a grid: x (nx,), y (ny,), height (ny, nx) [m], remarks, whether scattered.
 
     Points in any order that fill a grid are taken as they are. Others are a cloud: heights between
     them follow linearly from the triangles of a Delaunay net.
@@ -46,7 +46,7 @@ def read_points(path: Path, unit: str, spacing: float | None, most: int) -> _Gri
     spacing : float, optional [m]
         Of the grid of a cloud.
     most : int
-        Largest number of heights.
+        Largest number of heights that a cloud is brought onto.
 
     Raises
     ------
@@ -60,13 +60,9 @@ def read_points(path: Path, unit: str, spacing: float | None, most: int) -> _Gri
     x, column = _places(points[:, 0])
     y, row = _places(points[:, 1])
     if len(x) * len(y) * _FILLED <= len(points):
-        if len(x) * len(y) > most:
-            raise SpecError(f"{path}: {len(y)} x {len(x)} heights; at most {most:,}: coarsen it")
-        if spacing is not None:
-            remarks += ("'spacing' means nothing: the points form a grid",)
-        return x, y, _on_grid(table, points, (len(y), len(x)), row, column), remarks
-    found = _gridded(path, points, spacing, most)
-    return *found[:3], (*remarks, *found[3])
+        return x, y, _on_grid(table, points, (len(y), len(x)), row, column), remarks, False
+    x, y, height, said = _gridded(path, points, spacing, most)
+    return x, y, height, (*remarks, *said), True
 
 
 def _read_table(path: Path) -> tuple[Table, tuple[str, ...]]:
@@ -125,7 +121,9 @@ def _on_grid(
     return height
 
 
-def _gridded(path: Path, points: FloatArray, spacing: float | None, most: int) -> _Grid:
+def _gridded(
+    path: Path, points: FloatArray, spacing: float | None, most: int
+) -> tuple[FloatArray, FloatArray, FloatArray, tuple[str, ...]]:
     """Bring scattered points onto a grid of their own spacing, or of a given one."""
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import ConvexHull, Delaunay, QhullError, cKDTree

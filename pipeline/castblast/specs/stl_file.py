@@ -21,9 +21,9 @@ from castblast.extras import require
 from castblast.muckpile.particles import FloatArray
 from castblast.reading import read_bytes
 
-#: More facets take longer to search than a bench is worth, and more memory than most have.
-MOST_FACETS = 4_000_000
-_LARGEST = 1 << 30
+#: More facets take more memory than most machines have: some 5 kB each as a wall.
+MOST_FACETS = 1_000_000
+_LARGEST = 1 << 29
 _HEADER, _RECORD = 84, 50
 _BEGIN = re.compile(rb"\bfacet\s+normal\b", re.IGNORECASE)
 _VERTEX = re.compile(rb"\bvertex[ \t]+\S+[ \t]+\S+[ \t]+\S+[ \t]*(?=[\r\n])", re.IGNORECASE)
