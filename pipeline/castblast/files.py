@@ -91,7 +91,12 @@ def require_writable(folder: Path) -> None:
 
 @contextmanager
 def staged(
-    folder: Path, *, resume: bool = False, keep: bool = False, replaces: Collection[str] = ()
+    folder: Path,
+    *,
+    resume: bool = False,
+    keep: bool = False,
+    replaces: Collection[str] = (),
+    name: str = UNFINISHED,
 ) -> Iterator[Path]:
     """Give a folder to write results into; when all are there they move into `folder` together.
 
@@ -107,13 +112,15 @@ def staged(
         Keep what is there when the work fails or is stopped.
     replaces : patterns
         Files of earlier results that are removed if no new one takes their place.
+    name : str
+        Of the folder, in `folder`, in which they lie until then.
 
     Raises
     ------
     OutputError
         The folder cannot be written to.
     """
-    scratch = folder / UNFINISHED
+    scratch = folder / name
     if not resume:
         shutil.rmtree(scratch, ignore_errors=True)
     require_writable(scratch)
@@ -124,6 +131,25 @@ def staged(
             shutil.rmtree(scratch, ignore_errors=True)
         raise
     publish(scratch, folder, replaces)
+
+
+def written_together(folder: Path, write: Callable[[Path], Sequence[Path]]) -> list[Path]:
+    """Let `write` make files in a folder, and put all of them into `folder` together.
+
+    Parameters
+    ----------
+    folder : path
+    write : callable
+        Takes a folder, returns its files.
+
+    Returns
+    -------
+    list of path
+        The files where they lie now.
+    """
+    with staged(folder, name=f"{UNFINISHED}.{uuid4().hex[:12]}") as scratch:
+        files = write(scratch)
+    return [folder / path.relative_to(scratch) for path in files]
 
 
 def publish(scratch: Path, folder: Path, replaces: Collection[str] = ()) -> None:

@@ -12,7 +12,14 @@ import numpy as np
 import pytest
 
 from castblast.errors import OutputError
-from castblast.files import UNFINISHED, require_writable, staged, write_text, write_with
+from castblast.files import (
+    UNFINISHED,
+    require_writable,
+    staged,
+    write_text,
+    write_with,
+    written_together,
+)
 
 
 def full(path: Path) -> None:
@@ -20,7 +27,7 @@ def full(path: Path) -> None:
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-def stop_after(written: Path, fault: type[BaseException] = KeyboardInterrupt) -> None:
+def stop_after(written: Path, fault: type[BaseException] = KeyboardInterrupt) -> Path:
     assert written.is_file()
     raise fault
 
@@ -120,6 +127,17 @@ def test_what_is_kept_is_gone_on_with(tmp_path: Path) -> None:
         stop_after(write_text(scratch / "two.txt", "2"))
     with staged(tmp_path) as scratch:
         assert list(scratch.iterdir()) == []
+
+
+def test_several_files_are_written_together(tmp_path: Path) -> None:
+    """What a stopped run keeps in the same folder is left alone."""
+    write_text(tmp_path / UNFINISHED / ".spool", "kept")
+    files = written_together(tmp_path, lambda folder: [write_text(folder / "a.txt", "a")])
+    assert files == [tmp_path / "a.txt"]
+    with pytest.raises(KeyboardInterrupt):
+        written_together(tmp_path, lambda folder: [stop_after(write_text(folder / "b.txt", "b"))])
+    assert sorted(path.name for path in tmp_path.iterdir()) == [UNFINISHED, "a.txt"]
+    assert (tmp_path / UNFINISHED / ".spool").read_text() == "kept"
 
 
 def test_a_folder_that_cannot_be_is_named_at_once(tmp_path: Path) -> None:

@@ -30,6 +30,11 @@ def case() -> CastCase:
     )
 
 
+def visible(folder: Path) -> list[str]:
+    """Files but for the hidden ones, from which they can be written again."""
+    return [path.name for path in folder.iterdir() if not path.name.startswith(".")]
+
+
 def film(folder: Path, **options: object) -> tuple[Frames, list[Path]]:
     start = case()
     frames = Frames(folder, start, BENCH, **options)
@@ -54,7 +59,7 @@ def test_animation_has_a_frame_per_state_and_moves(tmp_path: Path) -> None:
     # Balls, which alone are colourful, keep inside the picture and move to the right.
     colourful = [np.nonzero(np.ptp(picture, axis=2) > 40)[1].mean() for _, picture in shown]
     assert colourful == sorted(colourful)
-    assert [path.name for path in tmp_path.iterdir()] == ["animation.gif"]
+    assert visible(tmp_path) == ["animation.gif"]
 
 
 def test_the_same_states_give_the_same_bytes(tmp_path: Path) -> None:
@@ -66,7 +71,7 @@ def test_vtkhdf_alone_leaves_no_series_behind(tmp_path: Path) -> None:
     pytest.importorskip("vtkmodules.vtkIOHDF", reason="VTK is not installed")
     _, files = film(tmp_path, vtkhdf=True)
     assert files == [tmp_path / "balls.vtkhdf"]
-    assert [path.name for path in tmp_path.iterdir()] == ["balls.vtkhdf"]
+    assert visible(tmp_path) == ["balls.vtkhdf"]
 
 
 def test_vtk_writes_the_series(tmp_path: Path) -> None:
@@ -74,6 +79,44 @@ def test_vtk_writes_the_series(tmp_path: Path) -> None:
     _, files = film(tmp_path, vtk=True)
     assert files == [tmp_path / "frames" / "balls.pvd"]
     assert len(list((tmp_path / "frames").glob("balls_*.vtp"))) == 4
+
+
+def test_a_stopped_run_goes_on_with_its_frames(tmp_path: Path) -> None:
+    """Frames that came after the restart file was written are taken anew."""
+    pytest.importorskip("vtkmodules.vtkIOHDF", reason="VTK is not installed")
+    wanted = {"animation": "gif", "vtk": True, "vtkhdf": True}
+    _, whole = film(tmp_path / "whole", **wanted)
+    start, folder = case(), tmp_path / "stopped"
+
+    def take(frames: Frames, times: tuple[float, ...]) -> None:
+        for time in times:
+            moved = start.particles.position + np.array([30.0 * time, 0.0, 0.0])
+            frames(time, start.particles._replace(position=moved))
+
+    first = Frames(folder, start, BENCH, **wanted)
+    take(first, TIMES[:2])
+    kept = first.save()
+    take(first, (0.25, 0.27, 0.29))
+    second = Frames(folder, start, BENCH, **wanted)
+    second.resume(kept)
+    take(second, TIMES[2:])
+    again = second.close()
+    assert [path.name for path in again] == [path.name for path in whole]
+    for one, other in zip(whole, again, strict=True):
+        if one.suffix != ".vtkhdf":  # HDF5 notes the time of day
+            assert one.read_bytes() == other.read_bytes()
+    assert len(list((folder / "frames").glob("balls_*.vtp"))) == 4
+
+
+def test_other_frames_than_those_of_the_stopped_run_are_refused(tmp_path: Path) -> None:
+    frames = Frames(tmp_path, case(), BENCH, animation="gif")
+    with pytest.raises(
+        SpecError, match=r"took other frames \(none\) than now asked for \(animation"
+    ):
+        frames.resume({})
+    kept = frames.save() | {"frames.time": np.array([0.0, 0.1])}
+    with pytest.raises(SpecError, match="frames of the run that was stopped are gone"):
+        frames.resume(kept)
 
 
 def test_nothing_wanted_is_nothing_done(tmp_path: Path) -> None:

@@ -177,11 +177,14 @@ def measure_muckpile(
 
 
 def _show(screen: Screen, outcome: "MuckpileOutcome") -> Mapping[str, Any]:
+    """Show the result; one that is not to be believed says why and ends with exit code 4."""
     screen.table(("quantity", "value", "unit"), outcome.rows, title=outcome.title)
     for line in outcome.remarks:
         screen.note(line)
     for path in outcome.files:
         screen.say(f"wrote {path}")
+    if outcome.faults:
+        screen.fail(f"not ok: {'; '.join(outcome.faults)}")
     return outcome.document
 
 

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from castblast.errors import CheckError
 from castblast.names import printable
 from castblast.progress import ProgressCallback, silent
 
@@ -48,6 +49,11 @@ class Screen:
         """Print a remark on standard error unless quiet."""
         if not self.quiet:
             print(_lines(line), file=sys.stderr)
+
+    def fail(self, line: str, exit_code: int = CheckError.exit_code) -> None:
+        """Say on standard error that the result is not good, and leave with `exit_code`."""
+        print(_lines(line), file=sys.stderr)
+        self.exit_code = exit_code
 
     def table(self, header: Sequence[str], rows: Sequence[Sequence[str]], title: str = "") -> None:
         """Print a table for people; columns of numbers are aligned right, words left."""

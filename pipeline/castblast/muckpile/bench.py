@@ -120,6 +120,8 @@ def bench_volume(bench: Bench) -> float:
     return outline_volume(bench_outline(bench), bench.height)
 
 
+#: Blocks of a bench; each is a hole.
+MOST_BLOCKS = 100_000
 _LENGTHS = ("length", "width", "height", "burden", "spacing")
 
 
@@ -141,6 +143,13 @@ def check_bench(bench: Bench) -> list[str]:
             f"face_angle = {bench.face_angle:g} rad: the face would reach the rear of a bench "
             f"{bench.width:g} m wide and {bench.height:g} m high"
         )
+    if not faults:
+        blocks = bench.width / bench.burden * bench.length / bench.spacing
+        if blocks > MOST_BLOCKS:
+            faults.append(
+                f"burden {bench.burden:g} m, spacing {bench.spacing:g} m: cut the bench into "
+                f"{blocks:.2g} blocks; allowed: {MOST_BLOCKS:,}"
+            )
     return faults
 
 

@@ -145,6 +145,9 @@ class CastCounters(NamedTuple):
         Of the stable step by the rule, over the run.
     largest_overlap : float [-]
         Over the radius of the smaller ball, among the samples.
+    deep_share : float [-]
+        Contacts that overlap by more than `castblast.muckpile.survey.DEEP` radii of the smaller
+        ball, over the number of balls; the largest among the samples.
     seconds : float [s]
         Wall time, with compilation if there was any.
     """
@@ -156,6 +159,7 @@ class CastCounters(NamedTuple):
     smallest_step: float
     largest_step: float
     largest_overlap: float
+    deep_share: float
     seconds: float
 
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from castblast.errors import Status
+from castblast.errors import SpecError, Status
 from castblast.muckpile.bench import (
     Bench,
     assign_blocks,
@@ -35,7 +35,8 @@ from castblast.muckpile.outline import (
 )
 from castblast.muckpile.particles import FloatArray, Particles, particles_at_rest
 from castblast.muckpile.porosity import solid_fraction
-from castblast.muckpile.separation import push_apart
+from castblast.muckpile.restart import Arrays, Keeper
+from castblast.muckpile.separation import Look, push_apart
 from castblast.muckpile.simulation import Simulation
 from castblast.muckpile.sizes import (
     Sizes,
@@ -48,6 +49,7 @@ from castblast.muckpile.sizes import (
 )
 from castblast.muckpile.threads import thread_count
 from castblast.progress import ProgressCallback, silent
+from castblast.stopping import NEVER, StopRequest
 
 #: Solid fractions that random packings of rough balls can have at rest under gravity.
 LOOSEST, DENSEST = 0.55, 0.63
@@ -66,6 +68,7 @@ _REST = 1.7e-4
 _LOOK, _LONGEST_SETTLING = 0.01, 6.0
 #: Over the Sauter radius: the layer at floor and sides that balls do not fill.
 _WALL_LAYER = 0.433
+_NOT_KEPT = Keeper(None, "")
 
 
 class Packing(NamedTuple):
@@ -187,6 +190,8 @@ def fill_bench(
     law: ContactLaw | None = None,
     threads: int = 0,
     progress: ProgressCallback = silent,
+    restart: Keeper = _NOT_KEPT,
+    stop: StopRequest = NEVER,
 ) -> Packing:
     """Fill `bench` with settled balls.
 
@@ -207,11 +212,18 @@ def fill_bench(
     threads : int
         0: all; the packing does not depend on it.
     progress : callable
+    restart : Keeper
+        Keeps the state of the work; its key stands for all other arguments. What it holds is gone
+        on with, to the same last bit, and a file that cannot be used is passed over.
+    stop : StopRequest
+        Looked at whenever the state is whole.
 
     Raises
     ------
     ValueError
         See `check_packing` and `check_sizes`; the message names every fault.
+    Stopped
+        Somebody asked for it; the state is kept.
     """
     if sizes is None:
         faults = check_packing(bench, mean_radius, relative_deviation, solid_fraction)
@@ -230,17 +242,41 @@ def fill_bench(
     before = _LOOSE + (solid_fraction - _SETTLED - denser) / _COMPACTION
     taller = _heightened(bench, solid_fraction / before)
     body = None if is_convex(bench_outline(bench)) else bench_outline(bench)
-    with thread_count(threads) as number:
-        position = push_apart(
-            _scatter(taller, radius, rng),
-            radius,
-            parting_planes(taller),
-            _APART,
-            _MOST_SWEEPS,
-            lambda share, line: progress(0.2 * share, line),
-            body,
-        )
-        return _settle(particles_at_rest(position, radius), bench, law, number, progress)
+    kept = _kept(restart)
+
+    def look(state: Arrays) -> None:
+        if restart.due:
+            restart.keep(state)
+        if stop.made:
+            restart.write(state)
+            stop.obey(f"stopped while the bench was packed; {restart.how_to_go_on}")
+
+    with thread_count(threads):
+        if "clock" in kept:  # it was settling already
+            position = np.empty((len(radius), 3))
+            position[kept["_balls.identity"]] = kept["_balls.place"][:, 0:3]
+        else:
+            position = push_apart(
+                _scatter(taller, radius, rng),
+                radius,
+                parting_planes(taller),
+                _APART,
+                _MOST_SWEEPS,
+                lambda share, line: progress(0.2 * share, line),
+                body,
+                look,
+                kept or None,
+            )
+            kept = {}
+        return _settle(particles_at_rest(position, radius), bench, law, progress, look, kept)
+
+
+def _kept(restart: Keeper) -> Arrays:
+    """State of an interrupted packing; empty if there is none that can be used."""
+    try:
+        return restart.read() or {}
+    except SpecError:
+        return {}
 
 
 def _heightened(bench: Bench, factor: float) -> Bench:
@@ -271,9 +307,14 @@ def _scatter(bench: Bench, radius: FloatArray, rng: np.random.Generator) -> Floa
 
 
 def _settle(
-    apart: Particles, bench: Bench, law: ContactLaw, threads: int, progress: ProgressCallback
+    apart: Particles,
+    bench: Bench,
+    law: ContactLaw,
+    progress: ProgressCallback,
+    look: Look,
+    kept: Arrays,
 ) -> Packing:
-    """Let gravity act until the balls are at rest."""
+    """Let gravity act until the balls are at rest; go on from what was `kept`, if anything."""
     run = Simulation(
         apart,
         law,
@@ -287,6 +328,8 @@ def _settle(
     limit = _REST * weight * sauter
     brake = exp(-2.0 * _slowest_vibration(bench, law) * _LOOK)
     status = Status.NOT_CONVERGED
+    if kept:
+        run.resume(kept)
     while run.clock < _LONGEST_SETTLING:
         if not run.run(run.clock + _LOOK, inf):
             status = Status.UNSTABLE_STEP
@@ -296,6 +339,7 @@ def _settle(
             status = Status.OK
             break
         run.slow(brake)
+        look(run.save())
         progress(
             min(0.99, 0.2 + 0.4 * run.clock),
             f"packing: settling, t = {run.clock:.2f} s",

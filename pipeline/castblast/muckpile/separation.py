@@ -8,9 +8,12 @@ the density of random close packing this ends without overlaps. It replaces the 
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from math import sqrt
+from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from castblast.kernel import kernel
 from castblast.muckpile.neighbours import make_grid, sort_by_cell
@@ -18,6 +21,7 @@ from castblast.muckpile.outline import Outline
 from castblast.muckpile.pair_search import list_pairs
 from castblast.muckpile.particles import FloatArray, Int32Array
 from castblast.muckpile.paths import lay_out
+from castblast.muckpile.threads import require_threads
 from castblast.muckpile.walls import Walls
 from castblast.progress import ProgressCallback, silent
 
@@ -25,6 +29,13 @@ from castblast.progress import ProgressCallback, silent
 _SKIN = 0.4
 _NONE_HELD = np.empty(0, dtype=np.bool_)
 _NO_SIDES = np.empty((0, 5))
+
+#: Told the state of the work, as arrays by name.
+Look: TypeAlias = Callable[[dict[str, NDArray[Any]]], None]
+
+
+def _pass_by(state: dict[str, NDArray[Any]]) -> None:
+    """Look at nothing."""
 
 
 def push_apart(
@@ -35,6 +46,8 @@ def push_apart(
     most_sweeps: int = 2000,
     progress: ProgressCallback = silent,
     body: Outline | None = None,
+    look: Look = _pass_by,
+    resume: Mapping[str, NDArray[Any]] | None = None,
 ) -> FloatArray:
     """Return centres (n, 3) [m] without overlaps of more than `tolerance` mean radii.
 
@@ -49,12 +62,20 @@ def push_apart(
     progress : callable
     body : Outline, optional
         Sides that hold the balls besides the planes; corners may point inwards.
+    look : callable
+        Told the state now and then, as arrays by name.
+    resume : mapping, optional
+        Such a state, to go on from to the same last bit.
     """
+    require_threads()
     sides = _NO_SIDES if body is None else np.column_stack([body.corner, body.lean, body.sine])
     mean = float(np.mean(radius))
     place = np.column_stack([position, radius])
     identity = np.arange(len(radius))
     sweeps, overlap = 0, np.inf
+    if resume is not None:
+        place, identity = resume["place"].copy(), resume["identity"].copy()
+        sweeps, overlap = int(resume["sweeps"]), float(resume["overlap"])
     while sweeps < most_sweeps and overlap > tolerance * mean:
         reach = 2.0 * float(radius.max()) + _SKIN * mean
         rows = np.column_stack([place[:, 0:3], np.zeros_like(place[:, 0:3])])
@@ -76,6 +97,8 @@ def push_apart(
         )
         sweeps += done
         share = min(0.99, sweeps / most_sweeps)
+        state = {"place": place, "identity": identity}
+        look(state | {"sweeps": np.array(sweeps), "overlap": np.array(overlap)})
         progress(share, f"packing: overlaps up to {100.0 * overlap / mean:.0f} % of the radius")
     back = np.empty((len(radius), 3))
     back[identity] = place[:, 0:3]

@@ -36,6 +36,7 @@ from castblast.muckpile.survey import (
 from castblast.muckpile.threads import enough_threads
 from castblast.muckpile.wall_search import list_walls
 from castblast.muckpile.walls import Walls, wall_table
+from castblast.stopping import NEVER, StopRequest
 
 #: Skin over mean diameter; measured as the fastest for balls in free flight and at rest.
 SKIN_RATIO = 0.10
@@ -232,18 +233,21 @@ class Simulation:
         """Multiply all velocities and spins by `factor`."""
         self._balls.motion[:, 0:6] *= factor
 
-    def run(self, until: float, event: float) -> bool:
+    def run(self, until: float, event: float, stop: StopRequest = NEVER) -> bool:
         """Step to the first end of a step at or after `until` [s], or exactly to `event` [s].
 
         The step is fitted to `event`, never to `until`, so that a look at the state changes
-        nothing. Returns False if the state became non-finite.
+        nothing. Returns False if the state became non-finite. Once a `stop` has been requested it
+        may return earlier, perhaps within a step; the next call goes on as if it had not.
         """
         with enough_threads(len(self._balls.place)):
-            return self._run(until, event)
+            return self._run(until, event, stop)
 
-    def _run(self, until: float, event: float) -> bool:
+    def _run(self, until: float, event: float, stop: StopRequest) -> bool:
         while True:
             if self._pending < 0.0 and self.clock >= min(until, event):
+                return True
+            if stop.made and self.clock < min(until, event):
                 return True
             if self._stale:
                 if not self._renew_lists():

@@ -9,13 +9,14 @@ not stop a ball that spins about its contact normal.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from math import floor, inf, log, nan
 from pathlib import Path
 from time import perf_counter
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from castblast.errors import Status
 from castblast.muckpile.case import (
@@ -27,10 +28,11 @@ from castblast.muckpile.case import (
     check_case,
 )
 from castblast.muckpile.particles import Particles
-from castblast.muckpile.restart import Arrays, case_hash, read_restart, write_restart
+from castblast.muckpile.restart import INTERVAL, Arrays, Keeper, Kept, case_hash
 from castblast.muckpile.simulation import Simulation
 from castblast.muckpile.threads import thread_count
 from castblast.progress import ProgressCallback, silent
+from castblast.stopping import NEVER, StopRequest
 
 __all__ = [
     "CastCase",
@@ -55,6 +57,7 @@ class _Record:
         self.rows: list[tuple[float, ...]] = []
         self.largest_energy = 0.0
         self.largest_overlap = 0.0
+        self.deep_share = 0.0
         self.quiet_since = inf
         self.next_sample = case.sample_interval
         self.firings = 0
@@ -66,7 +69,7 @@ class _Record:
         kept = {name: np.asarray(value) for name, value in vars(self).items() if name != "case"}
         return {f"record.{name}": array for name, array in kept.items()}
 
-    def resume(self, arrays: Arrays) -> None:
+    def resume(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Go back to what `save` returned."""
         for name in vars(self).keys() - {"case"}:
             setattr(self, name, arrays[f"record.{name}"].tolist())
@@ -81,6 +84,7 @@ class _Record:
         self.rows.append((run.clock, moving, balls.rotational_energy, *centre, contacts.contacts))
         self.largest_energy = max(self.largest_energy, moving)
         self.largest_overlap = max(self.largest_overlap, contacts.largest_overlap)
+        self.deep_share = max(self.deep_share, contacts.deep_share)
         if moving > self.case.stop_energy_ratio * self.largest_energy:
             self.quiet_since = inf
         elif self.quiet_since == inf:
@@ -97,8 +101,11 @@ class _Record:
         now, moving = self.rows[-1][0], self.rows[-1][1]
         if now <= last_firing or not 0.0 < moving < self.largest_energy:
             return min(0.1, 0.1 * now / max(last_firing, 1e-9))
+        of_time = now / self.case.max_time
+        if not 0.0 < self.case.stop_energy_ratio < 1.0:
+            return min(0.99, of_time)
         decay = log(self.largest_energy / moving) / -log(self.case.stop_energy_ratio)
-        return min(0.99, max(0.1 + 0.89 * decay, now / self.case.max_time))
+        return min(0.99, max(0.1 + 0.89 * decay, of_time))
 
     def history(self) -> CastHistory:
         """Return the samples as arrays."""
@@ -112,42 +119,13 @@ class _Record:
         )
 
 
-class _Keeper:
-    """Writes the restart file of a run now and then; without a path it does nothing."""
-
-    def __init__(self, case: CastCase, path: Path | None, interval: float) -> None:
-        self.path, self.interval = path, interval
-        self.key = case_hash(case) if path else ""
-        self.last = perf_counter()
-
-    def resume(self, run: Simulation, record: _Record) -> bool:
-        """Go on from the file, if there is one."""
-        if self.path is None or not self.path.exists():
-            return False
-        arrays = read_restart(self.path, self.key)
-        run.resume(arrays)
-        record.resume(arrays)
-        return True
-
-    def keep(self, run: Simulation, record: _Record) -> None:
-        """Write the file if it is time to."""
-        if self.path is None or perf_counter() - self.last < self.interval:
-            return
-        write_restart(self.path, self.key, run.save() | record.save())
-        self.last = perf_counter()
-
-    def finish(self) -> None:
-        """Remove the file: nothing is left to go on with."""
-        if self.path is not None:
-            self.path.unlink(missing_ok=True)
-
-
 def run_cast(
     case: CastCase,
     progress: ProgressCallback = silent,
     snapshot: SnapshotCallback | None = None,
     restart: Path | None = None,
-    restart_interval: float = 300.0,
+    restart_interval: float = INTERVAL,
+    stop: StopRequest = NEVER,
 ) -> CastResult:
     """Simulate a cast from the first firing to rest.
 
@@ -158,12 +136,15 @@ def run_cast(
         Called at every sample.
     snapshot : callable, optional
         Called with the state at the start, every `snapshot_interval` and at the end. It changes
-        no number of the result.
+        no number of the result. If it is `Kept`, its own state goes into the restart file.
     restart : path, optional
         File that keeps the state of the run. If it is there, the run goes on from it, to the same
-        last bit as without interruption; it is removed when the run has ended well.
+        last bit as without interruption. It is written once more at the end of the run, and is
+        the caller's to remove when the result is safe.
     restart_interval : float [s]
         Least wall time between two writings of it.
+    stop : StopRequest
+        Looked at whenever the state of the run is whole.
 
     Returns
     -------
@@ -175,14 +156,16 @@ def run_cast(
         The case contradicts itself; the message names every fault of `check_case`.
     SpecError
         The restart file belongs to another case or cannot be read.
+    Stopped
+        Somebody asked for it; the restart file is written.
     """
     if faults := check_case(case):
         raise ValueError("; ".join(faults))
     began = perf_counter()
     with thread_count(case.threads):
         run = _make_run(case)
-        keeper = _Keeper(case, restart, restart_interval)
-        return _run_to_rest(case, run, keeper, progress, snapshot, began)
+        keeper = Keeper(restart, case_hash(case) if restart else "", restart_interval)
+        return _run_to_rest(case, run, keeper, progress, snapshot, stop, began)
 
 
 def _make_run(case: CastCase) -> Simulation:
@@ -207,16 +190,21 @@ def _make_run(case: CastCase) -> Simulation:
 def _run_to_rest(
     case: CastCase,
     run: Simulation,
-    keeper: _Keeper,
+    keeper: Keeper,
     progress: ProgressCallback,
     snapshot: SnapshotCallback | None,
+    stop: StopRequest,
     began: float,
 ) -> CastResult:
     record = _Record(case)
     firings = np.unique(case.block_delay[case.block_delay < case.max_time])
     last_firing = float(firings[-1]) if len(firings) else 0.0
     status = Status.NOT_CONVERGED
-    if not keeper.resume(run, record):
+    parts: list[Kept] = [run, record, *([snapshot] if isinstance(snapshot, Kept) else [])]
+    if (kept := keeper.read()) is not None:
+        for part in parts:
+            part.resume(kept)
+    else:
         record.add(run)
         record.initial = _mechanical_energy(case, run)
         if snapshot:
@@ -225,13 +213,19 @@ def _run_to_rest(
     if case.snapshot_interval > 0.0:
         next_picture = case.snapshot_interval * (1.0 + floor(run.clock / case.snapshot_interval))
     firings = firings[record.firings :]
-    while run.clock < case.max_time:
+    if not len(firings) and kept is not None and record.at_rest(last_firing):
+        status = Status.OK
+    while status == Status.NOT_CONVERGED and run.clock < case.max_time:
+        if stop.made:
+            keeper.write(_state_of(parts))
+            stop.obey(f"stopped at t = {run.clock:.2f} s of the cast; {keeper.how_to_go_on}")
         if len(firings) and run.clock >= firings[0]:
             record.fired += _fire(case, run, float(firings[0]))
             record.firings += 1
             firings = firings[1:]
         event = min(float(firings[0]), case.max_time) if len(firings) else case.max_time
-        if run.clock < event and not run.run(min(record.next_sample, next_picture), event):
+        look = min(record.next_sample, next_picture)
+        if run.clock < event and not run.run(look, event, stop):
             status = Status.UNSTABLE_STEP
             break
         if run.clock >= record.next_sample:
@@ -240,12 +234,11 @@ def _run_to_rest(
                 status = Status.UNSTABLE_STEP
                 break
             record.next_sample += case.sample_interval
-            keeper.keep(run, record)
-            progress(record.share(last_firing), _line(record))
+            fault = keeper.keep(_state_of(parts)) if keeper.due else ""
+            progress(record.share(last_firing), fault or _line(record))
             if not len(firings) and record.at_rest(last_firing):
                 status = Status.OK
-                break
-        if run.clock >= next_picture:
+        if run.clock >= next_picture and status != Status.OK:
             next_picture += case.snapshot_interval
             if snapshot:
                 snapshot(run.clock, run.state())
@@ -253,7 +246,7 @@ def _run_to_rest(
     if snapshot and status != Status.UNSTABLE_STEP:
         snapshot(run.clock, state)
     if status != Status.UNSTABLE_STEP:
-        keeper.finish()
+        keeper.keep(_state_of(parts))
     progress(1.0, _line(record))
     return CastResult(
         state,
@@ -271,9 +264,15 @@ def _run_to_rest(
             run.smallest_step,
             run.largest_step,
             record.largest_overlap,
+            record.deep_share,
             perf_counter() - began,
         ),
     )
+
+
+def _state_of(parts: list[Kept]) -> Arrays:
+    """All that a restart file holds."""
+    return {name: array for part in parts for name, array in part.save().items()}
 
 
 def _line(record: _Record) -> str:

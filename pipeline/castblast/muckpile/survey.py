@@ -16,7 +16,11 @@ from castblast.muckpile.contact import Constants, spring_energy
 from castblast.muckpile.neighbours import PIECES
 from castblast.muckpile.particles import FloatArray, IntArray, RealArray
 from castblast.muckpile.state import Balls, Contacts
+from castblast.muckpile.threads import require_threads
 from castblast.muckpile.walls import WallTable, wall_distance
+
+#: Overlap over the radius of the smaller ball from which a contact counts as deep.
+DEEP = 0.5
 
 
 class BallSurvey(NamedTuple):
@@ -37,6 +41,7 @@ class BallSurvey(NamedTuple):
 
 def survey_balls(balls: Balls) -> BallSurvey:
     """Energies and means of all balls."""
+    require_threads()
     sums = _sum_balls(balls).sum(axis=0)
     mass, translation, rotation = map(float, sums[0:3])
     return BallSurvey(mass, 0.5 * translation, 0.5 * rotation, sums[3:6] / mass)
@@ -127,6 +132,8 @@ class ContactSurvey(NamedTuple):
         Of balls with balls.
     worst : int
         Ball, in the order of cells, of the largest overlap.
+    deep_share : float [-]
+        Contacts deeper than `DEEP`, with balls and walls, over the number of balls.
     """
 
     energy: float
@@ -134,6 +141,7 @@ class ContactSurvey(NamedTuple):
     total_overlap: float
     contacts: int
     worst: int
+    deep_share: float
 
 
 def survey_contacts(
@@ -145,12 +153,18 @@ def survey_contacts(
     law: Constants,
 ) -> ContactSurvey:
     """Energy, overlaps and number of contacts."""
-    rows = np.zeros((len(slab) - 1, 5))
+    require_threads()
+    rows = np.zeros((len(slab) - 1, 6))
     _survey_slabs(balls, pairs, touches, walls, slab, law, rows)
     deepest = int(np.argmax(rows[:, 1]))
-    energy, _, total, contacts, _ = rows.sum(axis=0)
+    energy, _, total, contacts, _, deep = map(float, rows.sum(axis=0))
     return ContactSurvey(
-        float(energy), float(rows[deepest, 1]), float(total), int(contacts), int(rows[deepest, 4])
+        energy,
+        float(rows[deepest, 1]),
+        total,
+        int(contacts),
+        int(rows[deepest, 4]),
+        deep / len(balls.place),
     )
 
 
@@ -190,6 +204,8 @@ def _survey_pairs(
                 share = overlap / min(radius, place[j, 3])
                 if share > rows[s, 1]:
                     rows[s, 1], rows[s, 4] = share, i
+                if share > DEEP:
+                    rows[s, 5] += 1.0
                 rows[s, 2] += overlap
                 rows[s, 3] += 1.0
 
@@ -218,3 +234,5 @@ def _survey_walls(
                 rows[s, 0] += spring_energy(memory, p, overlap, radius, law.shear_ratio)
                 if overlap > rows[s, 1] * radius:
                     rows[s, 1], rows[s, 4] = overlap / radius, i
+                if overlap > DEEP * radius:
+                    rows[s, 5] += 1.0

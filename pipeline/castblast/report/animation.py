@@ -1,22 +1,21 @@
 """Animation of a cast: the scene from above and aside, and a section below it, over time.
 
-States are spooled to a temporary file as they come (12 bytes a ball and frame), so that the
-picture can be framed by where the pile ends, and painted when the run is over. A gif is written
+States are spooled to a file as they come (12 bytes a ball and frame), so that the picture can be
+framed by where the pile ends, and painted when the run is over. A gif is written
 frame by frame with Pillow, an mp4 by ffmpeg through matplotlib, where it is installed.
 """
 
 from __future__ import annotations
 
-import tempfile
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.errors import SpecError
+from castblast.errors import OutputError, SpecError
 from castblast.files import write_with
 from castblast.muckpile.bench import Bench
 from castblast.muckpile.particles import Particles
@@ -35,6 +34,7 @@ _WIDTH, _DPI = 8.0, 90
 _COLOURS = 96
 _LAST_FRAME = 1.5  # seconds that the end of a gif stands still
 _FASTEST = 30.0
+_SPOOL = ".positions"
 
 
 def need_format(name: str) -> None:
@@ -62,7 +62,7 @@ class Animation:
     Parameters
     ----------
     folder : path
-        Of the temporary file, which has no name and vanishes with the process.
+        Of the spooled states, in a hidden file.
     start : Particles
     bench : Bench
     walls : Walls
@@ -72,13 +72,47 @@ class Animation:
     def __init__(self, folder: Path, start: Particles, bench: Bench, walls: Walls) -> None:
         self._start, self._bench, self._walls = start, bench, walls
         self._colours = block_colours(origin_blocks(start, bench), bench)
-        self._spool = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115 - lives as long as this
+        self._path = folder / _SPOOL
+        self._file: IO[bytes] | None = None
         self.times: list[float] = []
+
+    @property
+    def _spool(self) -> IO[bytes]:
+        if self._file is None:
+            self._file = self._path.open("w+b")
+        return self._file
 
     def add(self, time: float, balls: Particles) -> None:
         """Keep the state at `time` [s]."""
-        self._spool.write(balls.position.astype(np.float32).tobytes())
+        try:
+            self._spool.write(balls.position.astype(np.float32).tobytes())
+            self._spool.flush()
+        except OSError as fault:
+            raise OutputError(f"{self._path}: cannot be written: {fault.strerror}") from None
         self.times.append(time)
+
+    def resume(self, times: Sequence[float]) -> None:
+        """Go on after the states at `times` [s] that an earlier process has spooled.
+
+        Raises
+        ------
+        SpecError
+            They are not there.
+        """
+        size = len(times) * self._start.position.size * np.dtype(np.float32).itemsize
+        if not self._path.is_file() or self._path.stat().st_size < size:
+            message = f"{self._path}: the frames of the run that was stopped are gone"
+            raise SpecError(message)
+        self._file = self._path.open("r+b")
+        self._file.truncate(size)
+        self._file.seek(size)
+        self.times = list(times)
+
+    def close(self) -> None:
+        """Let go of the spooled states; they stay, hidden, in the folder."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
 
     def write(self, path: Path) -> Path:
         """Paint all states and write them as gif or mp4, by the suffix of `path`."""

@@ -10,6 +10,7 @@ scaled by twice the radius.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -47,7 +48,7 @@ class VtkSeries:
     Parameters
     ----------
     folder : path
-        Frames of an earlier series in it are removed.
+        Frames of an earlier series in it are removed, unless they are gone on with.
     name : str
         Files are called NAME_00000.vtp and so on, and NAME.pvd.
     """
@@ -56,8 +57,26 @@ class VtkSeries:
         self.folder, self.name = folder, name
         self.times: list[float] = []
         folder.mkdir(parents=True, exist_ok=True)
-        for old in folder.glob(f"{name}_*.vtp"):
-            if _FRAME.search(old.name):
+
+    def resume(self, times: Sequence[float]) -> None:
+        """Go on after the states at `times` [s] that an earlier process has written.
+
+        Raises
+        ------
+        SpecError
+            They are not there.
+        """
+        self.times = list(times)
+        for path in self.paths:
+            if not path.is_file():
+                message = f"{path}: the frames of the run that was stopped are gone"
+                raise SpecError(message)
+        self._remove_others()
+
+    def _remove_others(self) -> None:
+        ours = set(self.paths)
+        for old in self.folder.glob(f"{self.name}_*.vtp"):
+            if _FRAME.search(old.name) and old not in ours:
                 old.unlink()
 
     @property
@@ -69,6 +88,8 @@ class VtkSeries:
         """Write the state at `time` [s]."""
         from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
 
+        if not self.times:
+            self._remove_others()
         data = _poly_data(balls)
         self.times.append(time)
 

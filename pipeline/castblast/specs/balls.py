@@ -21,6 +21,8 @@ from castblast.specs.fragments import FragmentsSpec, fragment_curve
 from castblast.specs.loading import Spec
 from castblast.specs.quantity import QuantityError, QuantityIn
 
+#: More than any machine of today throws in a week.
+MOST_BALLS = 5_000_000
 #: With more the smallest of a normal distribution would have no size.
 _WIDEST_NORMAL = 0.4
 _ROUNDS = 6
@@ -51,7 +53,7 @@ class BallsSpec(Spec):
     """
 
     mean_radius: Annotated[float, QuantityIn("m", *_MEAN_RADII)] | None = None
-    count: Annotated[int, Field(ge=10, le=5_000_000)] | None = None
+    count: Annotated[int, Field(ge=10, le=MOST_BALLS)] | None = None
     file: Annotated[str, Field(min_length=1)] | None = None
     distribution: Literal["uniform", "normal"] = "uniform"
     relative_deviation: Annotated[float, QuantityIn("1", 0.0, _WIDEST)] = 0.5

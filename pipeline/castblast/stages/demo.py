@@ -154,8 +154,10 @@ def _throw(demo: Demo, progress: ProgressCallback) -> list[str]:
     outcome = run_muckpile(
         demo.bench, folder, velocity=velocity, threads=demo.workers, progress=progress
     )
-    mark_valid(folder, key)
-    return [f"{name}: {value} {unit}" for name, value, unit in outcome.rows[:6]]
+    if not outcome.faults:
+        mark_valid(folder, key)
+    lines = [f"{name}: {value} {unit}" for name, value, unit in outcome.rows[:6]]
+    return lines + [f"not ok: {fault}" for fault in outcome.faults]
 
 
 def _report(demo: Demo, progress: ProgressCallback) -> list[str]:

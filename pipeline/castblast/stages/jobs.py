@@ -9,8 +9,10 @@ from __future__ import annotations
 import multiprocessing
 import os
 import pickle
-from collections.abc import Callable, Sequence
+import signal
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -99,6 +101,22 @@ def _run_away(jobs: Sequence[Job], count: int, progress: ProgressCallback) -> li
             raise
 
 
+@contextmanager
+def _interrupts_for_parent_only() -> Iterator[None]:
+    """Start processes that never hear Ctrl-C, which reaches all processes of a terminal.
+
+    They inherit that it is blocked; the parent, which hears it afterwards, ends them.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def available_cores() -> int:
     """Cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
@@ -116,9 +134,10 @@ def _run_here(job: Job) -> Any:
 def _collect(
     pool: ProcessPoolExecutor, jobs: Sequence[Job], count: int, progress: ProgressCallback
 ) -> list[Any]:
-    futures: dict[Future[Any], int] = {
-        pool.submit(job.function, *job.arguments): number for number, job in enumerate(jobs)
-    }
+    with _interrupts_for_parent_only():
+        futures: dict[Future[Any], int] = {
+            pool.submit(job.function, *job.arguments): number for number, job in enumerate(jobs)
+        }
     results: list[Any] = [None] * len(jobs)
     left = set(futures)
     while left:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from castblast.errors import SimulationError, SpecError, Status, nearest_name
+from castblast.errors import SimulationError, SpecError, Status
+from castblast.files import publish, require_writable, staged
+from castblast.locks import LOCK_NAME, only_writer
 from castblast.muckpile.bench import Bench
 from castblast.muckpile.enclosure import rock_walls
 from castblast.muckpile.initial_state import pressed_share
@@ -16,34 +19,35 @@ from castblast.muckpile.metrics import pile_metrics
 from castblast.muckpile.particles import Particles
 from castblast.muckpile.simulation import Simulation
 from castblast.muckpile.solver import CastCase, CastResult, run_cast
-from castblast.muckpile.state import PRECISIONS
 from castblast.muckpile.terrain import wall_faults
 from castblast.muckpile.threads import thread_count
 from castblast.muckpile.walls import Walls, bench_walls, join, slope
-from castblast.progress import ProgressCallback, silent
+from castblast.progress import ProgressCallback, silent, with_time_left
 from castblast.resources import find_spec
 from castblast.specs.balls import ChosenSizes
 from castblast.specs.bench import BenchSpec, load_bench
 from castblast.specs.ground import Ground, read_ground, rough_ground
-from castblast.specs.quantity import parse_quantity
+from castblast.stages.muckpile_bounds import BallSizes, require_bounds
 from castblast.stages.muckpile_deck import Decks, write_decks
-from castblast.stages.muckpile_extras import Extras, read_extras
+from castblast.stages.muckpile_extras import Extras, ReadExtras, read_extras
 from castblast.stages.muckpile_frames import Frames
+from castblast.stages.muckpile_options import with_numerics, with_options
 from castblast.stages.muckpile_ore import follow_ore
 from castblast.stages.muckpile_plan import Plan, make_plan
 from castblast.stages.muckpile_results import (
+    OPTIONAL_FILES,
     MuckpileOutcome,
+    Start,
     bench_content,
     describe_run,
     write_results,
 )
 from castblast.stages.muckpile_start import make_start
 from castblast.stages.muckpile_velocity import velocity_remarks
+from castblast.stopping import StopRequest, deferred_stop
 
 _PACKING_SHARE, _CAST_SHARE = 0.25, 0.95
-_MAX_VELOCITY = 100.0
-_FEWEST_BALLS = 10
-_RESTART = "restart.npz"
+_RESTART, _FAILED = "restart.npz", "unstable"
 #: Simulated time [s] that is enough for one step.
 _ONE_STEP = 1e-12
 
@@ -63,7 +67,9 @@ def run_muckpile(
     decks: Decks = Decks(),  # noqa: B008 - a record of constants
     progress: ProgressCallback = silent,
 ) -> MuckpileOutcome:
-    """Run a bench file; an interrupted run goes on where it was, to the same numbers.
+    """Run a bench file; a run that was stopped goes on where it was, to the same numbers.
+
+    Results appear together when all of them are written; until then those of an earlier run stay.
 
     Parameters
     ----------
@@ -98,12 +104,18 @@ def run_muckpile(
         Faults of the bench file, of a file of balls, holes, ground or ore, or of an extra; a wall
         that cuts the balls, a step above the stable one, too little memory, or what another engine
         cannot take. Nothing has been simulated then, and a packing that was made is kept.
+    OutputError
+        The folder cannot be written to, or the disk is full.
+    LockedError
+        Another run writes into the folder.
     SimulationError
         The simulation became unstable; its last restart file is kept.
+    Stopped
+        Ctrl-C or SIGTERM: what has been done is kept in ``restart.npz``, or beside the packings.
     """
     path = find_spec(bench, "bench")
-    spec = _with_options(load_bench(path), balls, velocity)
-    spec = _with_numerics(spec, precision, sleeping)
+    spec = with_options(load_bench(path), balls, velocity)
+    spec = with_numerics(spec, precision, sleeping)
     if seed is not None:
         spec = spec.model_copy(update={"seed": seed})
     geometry = spec.bench.to_bench()
@@ -113,40 +125,99 @@ def run_muckpile(
     walls = bench_surroundings(spec, geometry, ground)
     plan = make_plan(spec, geometry, path.parent, one_speed=velocity is not None)
     folder = Path("runs") / spec.name if out is None else out
-    threads = threads or 0
+    require_writable(folder)
+    job = _Job(
+        spec=spec,
+        bench=geometry,
+        beside=path.parent,
+        folder=folder,
+        plan=plan,
+        walls=walls,
+        ground=ground,
+        extras=extras,
+        wanted=wanted,
+        threads=threads or 0,
+    )
+    packings = folder / "packings" if packings is None else packings
+    with only_writer(folder / LOCK_NAME, folder):
+        with deferred_stop() as stop:
+            report = _long_part(progress, 0.0, _PACKING_SHARE)
+            start, case, more = _prepare(job, packings, report, stop)
+        if decks.wanted:
+            written = write_decks(spec, case, decks)
+            remarks = velocity_remarks(plan.prediction)
+            return _with_remarks(replace(written, remarks=remarks), ground)
+        return _throw(job, start, case, more, progress)
+
+
+class _Job(NamedTuple):
+    """What is asked for, read and checked."""
+
+    spec: BenchSpec
+    bench: Bench
+    beside: Path
+    folder: Path
+    plan: Plan
+    walls: Walls
+    ground: Ground
+    extras: Extras
+    wanted: ReadExtras
+    threads: int
+
+    @property
+    def restart(self) -> Path:
+        """File that keeps the state of the cast until all results are written."""
+        return self.folder / _RESTART
+
+
+def _prepare(
+    job: _Job, packings: Path, progress: ProgressCallback, stop: StopRequest
+) -> tuple[Start, CastCase, dict[str, Any]]:
+    """Balls before firing, the case, and what the document says of both."""
+    spec = job.spec
+    frames = job.extras.order(job.wanted.interval)
+
+    def require(sizes: BallSizes) -> None:
+        require_bounds(spec, sizes, job.folder, job.threads, frames)
+
     start, sizes = make_start(
-        spec,
-        geometry,
-        plan,
-        path.parent,
-        folder / "packings" if packings is None else packings,
-        threads,
-        _part(progress, 0.0, _PACKING_SHARE),
+        spec, job.bench, job.plan, job.beside, packings, job.threads, progress, require, stop
     )
-    case = _case(spec, walls, start.balls, plan, threads)
-    _require_possible(spec, case, ground)
-    if decks.wanted:
-        written = write_decks(spec, case, decks)
-        return _with_remarks(replace(written, remarks=velocity_remarks(plan.prediction)), ground)
-    folder.mkdir(parents=True, exist_ok=True)
-    result, frames = _simulate(
-        spec, case, folder, extras, wanted.interval, _part(progress, _PACKING_SHARE, _CAST_SHARE)
-    )
-    progress(_CAST_SHARE, "writing files and pictures")
-    metrics = pile_metrics(
-        start.balls,
-        result.particles,
-        geometry,
-        block_velocity=case.block_velocity,
-        walls=case.walls,
-    )
-    ore = follow_ore(wanted.ore, wanted.plan, case, result)
-    outcome = describe_run(spec, plan.speed, plan.prediction, start, result, metrics, ore)
-    more = {"fragments": _describe_sizes(sizes), **bench_content(spec, path.parent)}
-    outcome = _with_remarks(replace(outcome, document=outcome.document | more), ground)
-    files = write_results(folder, spec, case, result, outcome.document, ore, plan.label) + frames
+    case = _case(spec, job.walls, start.balls, job.plan, job.threads)
+    _require_possible(spec, case, job.ground)
+    more = {"fragments": _describe_sizes(sizes), **bench_content(spec, job.beside)}
+    return start, case, more
+
+
+def _throw(
+    job: _Job, start: Start, case: CastCase, more: dict[str, Any], progress: ProgressCallback
+) -> MuckpileOutcome:
+    """Simulate the cast and write all results at once; only then is its restart file removed."""
+    spec, wanted = job.spec, job.wanted
+    # Frames of a run that was stopped wait for it beside its restart file.
+    resume = job.extras.frames and job.restart.exists()
+    with staged(
+        job.folder, resume=resume, keep=job.extras.frames, replaces=OPTIONAL_FILES
+    ) as scratch:
+        cast = _long_part(progress, _PACKING_SHARE, _CAST_SHARE)
+        result, frames = _simulate(job, case, scratch, cast)
+        progress(_CAST_SHARE, "writing files and pictures")
+        metrics = pile_metrics(
+            start.balls,
+            result.particles,
+            job.bench,
+            block_velocity=case.block_velocity,
+            walls=case.walls,
+        )
+        ore = follow_ore(wanted.ore, wanted.plan, case, result)
+        plan = job.plan
+        outcome = describe_run(spec, plan.speed, plan.prediction, start, result, metrics, ore)
+        outcome = _with_remarks(replace(outcome, document=outcome.document | more), job.ground)
+        files = write_results(scratch, spec, case, result, outcome.document, ore, plan.label)
+        files += frames
+    job.restart.unlink(missing_ok=True)
     progress(1.0, f"{result.time:.1f} s simulated")
-    return replace(outcome, files=files)
+    return replace(outcome, files=[job.folder / path.relative_to(scratch) for path in files])
 
 
 def _with_remarks(outcome: MuckpileOutcome, ground: Ground) -> MuckpileOutcome:
@@ -158,78 +229,39 @@ def _with_remarks(outcome: MuckpileOutcome, ground: Ground) -> MuckpileOutcome:
 
 
 def _simulate(
-    spec: BenchSpec,
-    case: CastCase,
-    folder: Path,
-    extras: Extras,
-    interval: float,
-    progress: ProgressCallback,
+    job: _Job, case: CastCase, scratch: Path, progress: ProgressCallback
 ) -> tuple[CastResult, list[Path]]:
-    """Throw the bench; frames along the way are written even if it fails."""
-    frames, files = None, []
+    """Throw the bench; frames along the way are kept even if it fails."""
+    frames, files, extras = None, [], job.extras
     if extras.frames:
-        case = case._replace(snapshot_interval=interval)
+        case = case._replace(snapshot_interval=job.wanted.interval)
         frames = Frames(
-            folder,
+            scratch,
             case,
-            spec.bench.to_bench(),
+            job.bench,
             animation=extras.animation,
             vtk=extras.vtk,
             vtkhdf=extras.vtkhdf,
         )
-    # Frames along the way are not kept in a restart file: such a run begins anew.
-    restart = None if frames else folder / _RESTART
-    result = run_cast(case, progress, frames, restart)
+    with deferred_stop() as stop:
+        result = run_cast(case, progress, frames, job.restart, stop=stop)
     if frames is not None:
         progress(1.0, "writing frames")
         files = frames.close()
     if Status(result.status) is Status.UNSTABLE_STEP:
         message = (
-            f"{spec.name}: the simulation became unstable at {result.failed_time:.3g} s "
+            f"{job.spec.name}: the simulation became unstable at {result.failed_time:.3g} s "
             f"(ball {result.failed_ball})"
         )
-        if restart is not None and restart.exists():
-            message += f"; its last good state is kept in {restart}"
+        if job.restart.exists():
+            message += f"; its last good state is kept in {job.restart}"
+        if files:
+            aside = job.folder / _FAILED
+            shutil.rmtree(aside, ignore_errors=True)
+            publish(scratch, aside)
+            message += f"; its frames are in {aside}"
         raise SimulationError(message)
     return result, files
-
-
-def _with_options(spec: BenchSpec, balls: int | None, velocity: str | float | None) -> BenchSpec:
-    """Bench spec with what the command line sets instead of the file."""
-    update: dict[str, Any] = {}
-    if balls is not None:
-        if spec.balls.file is not None:
-            message = f"--balls: {spec.name} takes its balls from {spec.balls.file}"
-            raise SpecError(message)
-        made: dict[str, Any] = {"count": balls, "mean_radius": None}
-        if spec.balls.fragments is not None:
-            made["fragments"] = spec.balls.fragments.model_copy(update={"smallest": None})
-        update["balls"] = spec.balls.model_copy(update=made)
-        if balls < _FEWEST_BALLS:
-            raise SpecError(f"--balls: {balls}: at least {_FEWEST_BALLS} are needed")
-    if velocity is not None:
-        if isinstance(velocity, str):
-            velocity = parse_quantity(velocity, "m s-1", "--velocity")
-        if not 0.0 <= velocity <= _MAX_VELOCITY:
-            message = (
-                f"--velocity: {velocity:g} m/s: implausible; allowed: 0 to {_MAX_VELOCITY:g} m/s"
-            )
-            raise SpecError(message)
-        if spec.firing.pattern == "none":
-            message = f"--velocity: {spec.name} is not fired (firing.pattern: none)"
-            raise SpecError(message)
-        update |= {"velocity": velocity, "surrogate": None}
-    return spec.model_copy(update=update)
-
-
-def _with_numerics(spec: BenchSpec, precision: str | None, sleeping: bool | None) -> BenchSpec:
-    """Bench spec with what the command line says about the solution."""
-    if precision is not None and precision not in PRECISIONS:
-        hint = nearest_name(precision, PRECISIONS)
-        raise SpecError(f"--precision: {precision}: must be one of {', '.join(PRECISIONS)}{hint}")
-    given = {"precision": precision, "sleeping": sleeping}
-    update = {name: value for name, value in given.items() if value is not None}
-    return spec.model_copy(update={"numerics": spec.numerics.model_copy(update=update)})
 
 
 def _part(progress: ProgressCallback, low: float, high: float) -> ProgressCallback:
@@ -242,6 +274,11 @@ def _part(progress: ProgressCallback, low: float, high: float) -> ProgressCallba
         progress(low + reached * (high - low), line)
 
     return report
+
+
+def _long_part(progress: ProgressCallback, low: float, high: float) -> ProgressCallback:
+    """The same for a part that takes long: with the time that is left of it."""
+    return with_time_left(_part(progress, low, high))
 
 
 def _describe_sizes(chosen: ChosenSizes | None) -> dict[str, Any] | None:

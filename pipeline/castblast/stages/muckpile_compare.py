@@ -12,15 +12,16 @@ from typing import Any
 import numpy as np
 
 from castblast.errors import SpecError
-from castblast.files import write_text
-from castblast.muckpile.bench import Bench
+from castblast.files import require_writable, write_text, written_together
+from castblast.locks import LOCK_NAME, only_writer
 from castblast.muckpile.metrics import UNITS, Band, band
 from castblast.muckpile.profile import Profile
 from castblast.progress import ProgressCallback, silent
-from castblast.stages.muckpile_results import MuckpileOutcome, finite
-from castblast.stages.muckpile_tables import GROUND_COLUMN, MEAN_COLUMN, X_COLUMN
+from castblast.specs.bench import BenchSpec
+from castblast.stages.muckpile_read import FinishedRun, numbers, read_runs
+from castblast.stages.muckpile_results import MuckpileOutcome, bench_content, finite
+from castblast.stages.reuse import forget, is_valid, make_key, mark_valid
 
-_NEEDED = ("metrics.json", "profile.csv")
 _PER_BLOCK = ("block_throw", "block_spread")
 
 
@@ -37,28 +38,27 @@ def compare_runs(folders: Sequence[Path], out: Path) -> MuckpileOutcome:
     Returns
     -------
     MuckpileOutcome
-        `document` holds ``runs`` (name to headline metrics), ``bands`` (metric to mean, sd and
-        number of runs that know it) and ``units``.
+        `document` holds ``ok``, ``faults`` (of the runs), ``runs`` (name to headline metrics),
+        ``bands`` (metric to mean, sd and number of runs that know it) and ``units``.
 
     Raises
     ------
     SpecError
-        Fewer than two runs, or a folder without results; one line per fault.
+        Fewer than two runs, or a folder without results or with damaged ones; one line per fault.
+    OutputError
+        Nothing can be written to `out`.
     """
     if len(folders) < 2:
         raise SpecError("a comparison needs at least two runs")
-    missing = [
-        f"{folder}: {name} is missing; run castblast muckpile --out {folder} first"
-        for folder in folders
-        for name in _NEEDED
-        if not (folder / name).is_file()
-    ]
-    if missing:
-        raise SpecError("\n".join(missing))
-    documents = [json.loads((folder / "metrics.json").read_text("utf-8")) for folder in folders]
+    runs = read_runs(folders)
+    require_writable(out)
+    documents = [run.document for run in runs]
     names = _names(folders)
     bands = metric_bands_of(documents)
+    faults = _run_faults(names, documents)
     document = {
+        "ok": not faults,
+        "faults": faults,
         "runs": {
             name: {key: found[key] for key in UNITS if key not in _PER_BLOCK}
             for name, found in zip(names, documents, strict=True)
@@ -66,12 +66,25 @@ def compare_runs(folders: Sequence[Path], out: Path) -> MuckpileOutcome:
         "bands": {name: _plain(found) for name, found in bands.items()},
         "units": UNITS,
     }
-    files = [
-        write_text(out / "comparison.json", json.dumps(finite(document), indent=2) + "\n"),
-        _draw(out / "profiles.png", folders, names, documents[0]),
-    ]
+    text = json.dumps(finite(document), indent=2) + "\n"
+    files = written_together(
+        out,
+        lambda folder: [
+            write_text(folder / "comparison.json", text),
+            _draw(folder / "profiles.png", runs, names),
+        ],
+    )
     title = f"{len(folders)} runs: mean and standard deviation"
-    return MuckpileOutcome(document, title, band_rows(bands), files)
+    return MuckpileOutcome(document, title, band_rows(bands), files, faults=faults)
+
+
+def _run_faults(names: Sequence[str], documents: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Reasons not to believe a run, each with its name; runs of old versions say nothing."""
+    return [
+        f"{name}: {fault}"
+        for name, found in zip(names, documents, strict=True)
+        for fault in found.get("faults") or ()
+    ]
 
 
 def run_seeds(
@@ -84,6 +97,8 @@ def run_seeds(
 ) -> MuckpileOutcome:
     """Run a bench with several seeds, from that of its file on, and compare the runs.
 
+    Seeds that were finished before a stop are not run again.
+
     Parameters
     ----------
     bench, out, options
@@ -92,6 +107,7 @@ def run_seeds(
         At least 2.
     progress : callback
     """
+    from castblast.resources import find_spec
     from castblast.specs.bench import load_bench
     from castblast.stages.muckpile import run_muckpile
 
@@ -99,24 +115,45 @@ def run_seeds(
     folder = Path("runs") / spec.name if out is None else out
     first = options.pop("seed", None)
     first = spec.seed if first is None else first
-    folders, files = [], []
-    for k in range(seeds):
-        folders.append(folder / f"seed_{first + k}")
+    key = _seeds_key(spec, find_spec(bench, "bench").parent, options)
+    folders: list[Path] = []
+    files: list[Path] = []
+    remarks: list[str] = []
+    require_writable(folder)
+    with only_writer(folder / LOCK_NAME, folder):
+        for k in range(seeds):
+            each = folder / f"seed_{first + k}"
+            folders.append(each)
 
-        def report(share: float, line: str, k: int = k) -> None:
-            progress((k + share) / seeds, f"seed {first + k}: {line}")
+            def report(share: float, line: str, k: int = k) -> None:
+                progress((k + share) / seeds, f"seed {first + k}: {line}")
 
-        run = run_muckpile(bench, folders[-1], seed=first + k, progress=report, **options)
-        files += run.files
-    compared = compare_runs(folders, folder)
-    return replace(compared, files=files + compared.files, remarks=run.remarks)
+            if not is_valid(each, key):
+                forget(each)
+                run = run_muckpile(bench, each, seed=first + k, progress=report, **options)
+                files, remarks = files + run.files, run.remarks
+                mark_valid(each, key)
+        compared = compare_runs(folders, folder)
+        for each in folders:
+            forget(each)
+    return replace(compared, files=files + compared.files, remarks=remarks)
+
+
+def _seeds_key(spec: BenchSpec, beside: Path, options: Mapping[str, Any]) -> dict[str, str]:
+    """All that the runs depend on but their seed, which names their folders."""
+    extras = options.get("extras")
+    named = {"ore": extras.ore} if extras is not None and extras.ore else {}
+    free = ("threads", "packings")
+    asked = {name: value for name, value in options.items() if name not in free}
+    content = bench_content(spec, beside)["bench_sha256"]
+    return make_key(bench=content, options=repr(sorted(asked.items())), **named)
 
 
 def metric_bands_of(documents: Sequence[Mapping[str, Any]]) -> dict[str, Band]:
     """Bands of all metrics that the runs have in common; per-block ones only for equal blocks."""
     bands = {}
     for name in UNITS:
-        values = [_numbers(document.get(name)) for document in documents]
+        values = [numbers(document.get(name)) for document in documents]
         if len({value.shape for value in values}) == 1:
             bands[name] = band(values)
     return bands
@@ -134,13 +171,6 @@ def band_rows(bands: Mapping[str, Band]) -> list[tuple[str, str, str]]:
     return rows
 
 
-def _numbers(value: Any) -> Any:
-    """Array of what JSON holds, null as NaN."""
-    if isinstance(value, list):
-        return np.array([_numbers(item) for item in value], dtype=np.float64)
-    return np.array(math.nan if value is None else value, dtype=np.float64)
-
-
 def _plain(found: Band) -> dict[str, Any]:
     return {key: np.asarray(value).tolist() for key, value in found._asdict().items()}
 
@@ -151,19 +181,11 @@ def _names(folders: Sequence[Path]) -> list[str]:
     return short if len(set(short)) == len(short) else [str(folder) for folder in folders]
 
 
-def _draw(
-    path: Path, folders: Sequence[Path], names: Sequence[str], first: Mapping[str, Any]
-) -> Path:
+def _draw(path: Path, runs: Sequence[FinishedRun], names: Sequence[str]) -> Path:
     from castblast.report.movement_figures import draw_profiles
 
-    tables = [
-        np.genfromtxt(
-            folder / "profile.csv", delimiter=",", names=True, deletechars="", replace_space=" "
-        )
-        for folder in folders
-    ]
-    profiles = [Profile(table[X_COLUMN], table[MEAN_COLUMN]) for table in tables]
-    widest = max(tables, key=lambda table: float(table[X_COLUMN][-1]))
+    profiles = [run.pile for run in runs]
+    widest = max(runs, key=lambda run: float(run.ground.x[-1]))
     low = max(float(profile.x[0]) for profile in profiles)
     high = max(float(profile.x[-1]) for profile in profiles)
     x = np.linspace(low, high, 400)
@@ -172,9 +194,9 @@ def _draw(
     return draw_profiles(
         path,
         dict(zip(names, profiles, strict=True)),
-        Bench(**first["geometry"]),
-        Profile(widest[X_COLUMN], widest[GROUND_COLUMN]),
-        band=(Profile(x, scatter.mean), scatter.sd) if len(folders) > 2 else None,
+        runs[0].bench,
+        widest.ground,
+        band=(Profile(x, scatter.mean), scatter.sd) if len(runs) > 2 else None,
         band_words="one standard deviation over the runs",
         title="Mean surface of each run",
     )

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 from castblast.export.lammps_deck import write_lammps_deck
 from castblast.export.liggghts_deck import write_liggghts_deck
+from castblast.files import written_together
 from castblast.muckpile.solver import CastCase
 from castblast.specs.bench import BenchSpec
 from castblast.stages.muckpile_results import MuckpileOutcome
@@ -38,7 +40,7 @@ def write_decks(spec: BenchSpec, case: CastCase, decks: Decks) -> MuckpileOutcom
         (decks.liggghts, write_liggghts_deck),
     ):
         if folder is not None:
-            files += write(folder, case)
+            files += written_together(folder, partial(write, case=case))
     balls = len(case.particles.radius)
     rows = [
         (f"run {engine} with", f"cd {folder} && mpirun -np 8 {program} -in cast.in", "")

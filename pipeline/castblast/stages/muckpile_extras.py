@@ -12,7 +12,11 @@ from castblast.muckpile.ore import DigPlan, OrePolygon
 from castblast.specs.frame import FrameSpec
 from castblast.specs.ore import read_ore
 from castblast.specs.quantity import parse_quantity
+from castblast.stages.muckpile_bounds import FRAME_BYTES, FrameOrder
 from castblast.stages.muckpile_frames import FRAME_INTERVAL, check_frames
+
+#: Side [m] below which a dig block means nothing to a loader.
+_SMALLEST_DIG_BLOCK = 0.01
 
 
 class Extras(NamedTuple):
@@ -46,6 +50,12 @@ class Extras(NamedTuple):
         """Whether states along the way are wanted."""
         return self.animation is not None or self.vtk or self.vtkhdf
 
+    def order(self, interval: float) -> FrameOrder | None:
+        """Frames every `interval` [s] and what they take on disk; None: none are wanted."""
+        wanted = {"animation": self.animation is not None, "vtk": self.vtk, "vtkhdf": self.vtkhdf}
+        size = sum(FRAME_BYTES[name] for name, is_wanted in wanted.items() if is_wanted)
+        return FrameOrder(interval, size) if self.frames else None
+
 
 class ReadExtras(NamedTuple):
     """Wishes, checked."""
@@ -78,15 +88,19 @@ def read_extras(
     path = extras.ore or ore_of_bench
     plan = DigPlan(block=bench.spacing)
     if extras.dig_block is not None:
-        plan = plan._replace(block=_positive(extras.dig_block, "m", "--dig-block"))
+        block = _positive(extras.dig_block, "m", "--dig-block", _SMALLEST_DIG_BLOCK)
+        plan = plan._replace(block=block)
     if extras.flitch is not None:
-        plan = plan._replace(flitch=_positive(extras.flitch, "m", "--flitch"))
+        flitch = _positive(extras.flitch, "m", "--flitch", _SMALLEST_DIG_BLOCK)
+        plan = plan._replace(flitch=flitch)
     interval = _positive(extras.frame_interval, "s", "--frame-interval")
     return ReadExtras(() if path is None else read_ore(path, bench, frame), plan, interval)
 
 
-def _positive(value: str | float, unit: str, where: str) -> float:
+def _positive(value: str | float, unit: str, where: str, least: float = 0.0) -> float:
     number = parse_quantity(value, unit, where) if isinstance(value, str) else value
     if not 0.0 < number < float("inf"):
         raise SpecError(f"{where}: {value}: must be larger than 0 {unit}")
+    if number < least:
+        raise SpecError(f"{where}: {value}: allowed: at least {least:g} {unit}")
     return number

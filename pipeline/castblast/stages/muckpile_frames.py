@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from castblast.errors import SpecError
 from castblast.muckpile.bench import Bench
 from castblast.muckpile.case import CastCase
 from castblast.muckpile.particles import Particles
@@ -17,7 +20,9 @@ if TYPE_CHECKING:
 
 #: Simulated time [s] between two states by default.
 FRAME_INTERVAL = 0.1
-_FOLDER = "frames"
+_FOLDER, _HIDDEN = "frames", ".frames"
+#: Names under which the frames taken so far stand in a restart file.
+_TIMES, _KINDS = "frames.time", "frames.kinds"
 
 
 def check_frames(animation: str | None, *, vtk: bool, vtkhdf: bool) -> None:
@@ -42,11 +47,13 @@ def check_frames(animation: str | None, *, vtk: bool, vtkhdf: bool) -> None:
 class Frames:
     """Takes the states of a run; an instance is the snapshot callback of `run_cast`.
 
+    Together with a restart file and what lies in `folder`, a stopped run goes on with them.
+
     Parameters
     ----------
     folder : path
-        Of the results: ``animation.gif`` (or mp4), ``frames/balls_*.vtp`` and ``balls.pvd``,
-        ``balls.vtkhdf``.
+        Where results are made: ``animation.gif`` (or mp4), ``frames/balls_*.vtp`` and
+        ``balls.pvd``, ``balls.vtkhdf``.
     case : CastCase
         Give it a `snapshot_interval`.
     bench : Bench
@@ -69,7 +76,6 @@ class Frames:
         self._vtk, self._vtkhdf = vtk, vtkhdf
         self._film: Animation | None = None
         self._series: VtkSeries | None = None
-        self._scratch: Path | None = None
         folder.mkdir(parents=True, exist_ok=True)
         if animation:
             from castblast.report.animation import Animation
@@ -78,9 +84,7 @@ class Frames:
         if vtk or vtkhdf:
             from castblast.report.vtk_files import VtkSeries
 
-            if not vtk:
-                self._scratch = Path(tempfile.mkdtemp(prefix=".frames-", dir=folder))
-            self._series = VtkSeries(self._scratch or folder / _FOLDER)
+            self._series = VtkSeries(folder / (_FOLDER if vtk else _HIDDEN))
 
     def __bool__(self) -> bool:
         """Whether anything is wanted."""
@@ -93,20 +97,52 @@ class Frames:
         if self._series is not None and (not self._series.times or time > self._series.times[-1]):
             self._series.add(time, balls)
 
-    def close(self) -> list[Path]:
-        """Write what is still open; return the files that matter to people."""
-        files: list[Path] = []
-        try:
-            if self._series is not None and self._series.times:
-                if self._vtk:
-                    files.append(self._series.close())
-                if self._vtkhdf:
-                    from castblast.report.vtk_files import write_vtkhdf
+    @property
+    def _kinds(self) -> str:
+        wanted = {"animation": bool(self._format), "vtk": self._vtk, "vtkhdf": self._vtkhdf}
+        return " ".join(name for name, is_wanted in wanted.items() if is_wanted)
 
-                    files.append(write_vtkhdf(self._folder / "balls.vtkhdf", self._series))
-        finally:
-            if self._scratch is not None:
-                shutil.rmtree(self._scratch, ignore_errors=True)
-        if self._film is not None and self._film.times:
-            files.append(self._film.write(self._folder / f"animation.{self._format}"))
+    def save(self) -> dict[str, NDArray[Any]]:
+        """What belongs to the state of the run: times of the frames taken, and their kinds."""
+        taken = self._film or self._series
+        times = taken.times if taken is not None else []
+        return {_TIMES: np.array(times, dtype=np.float64), _KINDS: np.array(self._kinds)}
+
+    def resume(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Go on after the frames of a stopped run.
+
+        Raises
+        ------
+        SpecError
+            It took none, or of other kinds, or they are gone.
+        """
+        kinds = str(arrays.get(_KINDS, ""))
+        if kinds != self._kinds:
+            message = (
+                f"{self._folder.parent}: the run that was stopped took other frames "
+                f"({kinds or 'none'}) than now asked for ({self._kinds}); give the same options, "
+                f"or remove its restart file to start from the beginning"
+            )
+            raise SpecError(message)
+        for taker in (self._film, self._series):
+            if taker is not None:
+                taker.resume(arrays[_TIMES].tolist())
+
+    def close(self) -> list[Path]:
+        """Write what is still open; return the files that matter to people.
+
+        States stay in hidden files of the folder, so that writing can be repeated.
+        """
+        files: list[Path] = []
+        if self._series is not None and self._series.times:
+            if self._vtk:
+                files.append(self._series.close())
+            if self._vtkhdf:
+                from castblast.report.vtk_files import write_vtkhdf
+
+                files.append(write_vtkhdf(self._folder / "balls.vtkhdf", self._series))
+        if self._film is not None:
+            if self._film.times:
+                files.append(self._film.write(self._folder / f"animation.{self._format}"))
+            self._film.close()
         return files

@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from castblast.errors import SpecError
-from castblast.files import staged, write_csv, write_text, write_with
+from castblast.files import require_writable, staged, write_csv, write_text, write_with
+from castblast.locks import LOCK_NAME, only_writer
 from castblast.muckpile.bench import Bench
 from castblast.muckpile.case import CastCase
 from castblast.muckpile.metrics import pile_metrics
@@ -28,6 +29,7 @@ from castblast.stages.muckpile_ore import OreRun, describe_ore
 from castblast.stages.muckpile_plan import Plan, make_plan
 from castblast.stages.muckpile_results import (
     DOCUMENT_UNITS,
+    OPTIONAL_FILES,
     MuckpileOutcome,
     as_plain,
     finite,
@@ -48,6 +50,10 @@ _START_OF_DECK = "balls.data"
 #: Radii of both states, as engines print them.
 _SAME_RADIUS = 1e-4
 _ENERGY_ROW = "open energy balance"
+#: What a run of our own may have left there, and no file of balls can tell.
+_REPLACED = (*OPTIONAL_FILES, "history.csv", "energy.png")
+#: Not the folder in which a stopped run keeps its frames.
+_SCRATCH = ".measured"
 
 
 class _Measured(NamedTuple):
@@ -97,6 +103,10 @@ def measure_muckpile(
     ------
     SpecError
         Faults of the files, or balls that are not the same.
+    OutputError
+        The folder cannot be written to, or the disk is full.
+    LockedError
+        Another run writes into the folder.
     """
     path = find_spec(bench, "bench")
     spec = load_bench(path)
@@ -135,7 +145,11 @@ def measure_muckpile(
     if around.remarks:
         document |= {"ground_remarks": list(around.remarks)}
     folder = Path("runs") / spec.name if out is None else out
-    with staged(folder) as scratch:
+    require_writable(folder)
+    with (
+        only_writer(folder / LOCK_NAME, folder),
+        staged(folder, replaces=_REPLACED, name=_SCRATCH) as scratch,
+    ):
         files = [folder / name.relative_to(scratch) for name in _write(scratch, found, document)]
     rows = metric_rows(document | {"ledger": {"residual": None}})
     return MuckpileOutcome(

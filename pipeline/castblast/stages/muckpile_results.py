@@ -34,8 +34,19 @@ from castblast.stages.muckpile_velocity import (
     velocity_remarks,
     velocity_words,
 )
+from castblast.stages.muckpile_verdict import cast_faults
 from castblast.stages.reuse import file_hash
 
+#: Files that some runs write and others do not: they never stay beside those of another run.
+OPTIONAL_FILES = (
+    "movement.png",
+    "ore.png",
+    "animation.gif",
+    "animation.mp4",
+    "balls.vtkhdf",
+    "frames/balls.pvd",
+    "frames/balls_[0-9][0-9][0-9][0-9][0-9].vtp",
+)
 #: Unit of every number in the document; "1": none.
 DOCUMENT_UNITS = {
     "geometry": "m, face_angle rad",
@@ -54,13 +65,17 @@ DOCUMENT_UNITS = {
 
 @dataclass(frozen=True)
 class MuckpileOutcome:
-    """What a run found: a document in SI units, the same for people, and the files written."""
+    """What a run found: a document in SI units, the same for people, and the files written.
+
+    `faults` are reasons not to believe it.
+    """
 
     document: dict[str, Any]
     title: str
     rows: list[tuple[str, str, str]]
     files: list[Path] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
+    faults: list[str] = field(default_factory=list)
 
 
 class Start(NamedTuple):
@@ -95,11 +110,14 @@ def describe_run(
     """Put the results of a run into a document and rows for people; NaN where nothing is known."""
     counters = result.counters._asdict()
     seconds = counters.pop("seconds")
+    faults = cast_faults(result)
     document = {
         "bench": spec.name,
         "seed": spec.seed,
         "geometry": spec.bench.to_bench()._asdict(),
         "status": Status(result.status).name.lower(),
+        "ok": not faults,
+        "faults": faults,
         "balls": len(start.balls.radius),
         "mean_radius": float(start.balls.radius.mean()),
         "solid_fraction": start.solid_fraction,
@@ -124,7 +142,7 @@ def describe_run(
     if Status(result.status) is Status.NOT_CONVERGED:
         title += " (longest time reached before the pile came to rest)"
     remarks = velocity_remarks(prediction)
-    return MuckpileOutcome(plain, title, metric_rows(plain), remarks=remarks)
+    return MuckpileOutcome(plain, title, metric_rows(plain), remarks=remarks, faults=faults)
 
 
 def bench_content(spec: BenchSpec, beside: Path) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import zipfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +15,18 @@ from castblast.kernel import source_hash
 from castblast.muckpile.bench import Bench, bench_outline
 from castblast.muckpile.packing import count_of, fill_bench
 from castblast.muckpile.particles import Particles, particles_at_rest
+from castblast.muckpile.restart import Keeper
 from castblast.muckpile.sizes import Sizes
 from castblast.progress import ProgressCallback
+from castblast.reading import read_npz
 from castblast.specs.ball_files import read_balls
 from castblast.specs.balls import ChosenSizes, choose_sizes
 from castblast.specs.bench import BenchSpec
 from castblast.specs.place import extent, place_faults
-from castblast.stages.muckpile_memory import require_memory
+from castblast.stages.muckpile_bounds import BallSizes, sizes_of_balls, sizes_of_table
 from castblast.stages.muckpile_plan import Plan
 from castblast.stages.muckpile_results import Start
+from castblast.stopping import NEVER, StopRequest
 
 
 def make_start(
@@ -34,6 +37,8 @@ def make_start(
     packings: Path,
     threads: int,
     progress: ProgressCallback,
+    require: Callable[[BallSizes], None],
+    stop: StopRequest = NEVER,
 ) -> tuple[Start, ChosenSizes | None]:
     """Read the balls, or pack them, or take a packing of the same content from `packings`.
 
@@ -49,18 +54,23 @@ def make_start(
         Folder of packings, named by the hash of all they depend on.
     threads : int
     progress : callable
+    require : callable
+        Refuses too many balls, or unfit ones, before they are packed.
+    stop : StopRequest
 
     Raises
     ------
     SpecError
-        Faults of a file of balls, balls that do not fit the bench or the memory.
+        Faults of a file of balls, balls that do not fit the bench, or that `require` refuses.
     SimulationError
         The packing became unstable.
+    Stopped
+        Somebody asked for it; a packing under way is kept beside the finished ones.
     """
     if spec.balls.file is not None:
         path = beside / spec.balls.file
         balls = read_balls(path, spec.contact.to_law())
-        require_memory(len(balls.radius), spec.name)
+        require(sizes_of_balls(balls.radius))
         if (balls.block < 0).all():
             balls = balls._replace(block=plan.blocks_of(balls.position, bench))
         elif balls.block.max() >= len(plan.delay):
@@ -74,13 +84,16 @@ def make_start(
         chosen = choose_sizes(spec.balls, bench, spec.design() or {})
     except ValueError as fault:
         raise SpecError(f"{spec.name}: balls: {fault}") from None
-    require_memory(count_of(bench, chosen.sizes, spec.balls.solid_fraction), spec.name)
+    count = count_of(bench, chosen.sizes, spec.balls.solid_fraction)
+    require(sizes_of_table(chosen.sizes, count))
     key = _packing_key(spec, bench, chosen.sizes)
     path = packings / f"{key[:16]}.npz"
     start = _read_packing(path, key)
     if start is None:
-        start = _pack(spec, bench, chosen.sizes, threads, progress)
+        keeper = Keeper(packings / f"{key[:16]}.part.npz", key)
+        start = _pack(spec, bench, chosen.sizes, threads, progress, keeper, stop)
         _write_packing(path, key, start)
+        keeper.remove()
     else:
         progress(1.0, "packing of an earlier run")
     block = plan.blocks_of(start.balls.position, bench)
@@ -95,7 +108,13 @@ def _require_near(path: Path, balls: Particles, bench: Bench) -> None:
 
 
 def _pack(
-    spec: BenchSpec, bench: Bench, sizes: Sizes, threads: int, progress: ProgressCallback
+    spec: BenchSpec,
+    bench: Bench,
+    sizes: Sizes,
+    threads: int,
+    progress: ProgressCallback,
+    keeper: Keeper,
+    stop: StopRequest,
 ) -> Start:
     try:
         packing = fill_bench(
@@ -106,6 +125,8 @@ def _pack(
             law=spec.contact.to_law(),
             threads=threads,
             progress=progress,
+            restart=keeper,
+            stop=stop,
         )
     except ValueError as fault:
         raise SpecError(f"{spec.name}: {fault}") from None
@@ -131,14 +152,15 @@ def _packing_key(spec: BenchSpec, bench: Bench, sizes: Sizes) -> str:
 
 
 def _read_packing(path: Path, key: str) -> Start | None:
+    """Read a packing of this `key`; None if there is none, or none that can be used."""
     try:
-        with np.load(path, allow_pickle=False) as stored:
-            if str(stored["key"]) != key:
-                return None
-            balls = particles_at_rest(stored["x"], stored["r"])
-            fraction, settled = float(stored["solid_fraction"]), bool(stored["settled"])
-            return Start(balls, fraction, settled=settled, reused=True)
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        stored = read_npz(path)
+        if str(stored["key"]) != key:
+            return None
+        balls = particles_at_rest(stored["x"], stored["r"])
+        fraction, settled = float(stored["solid_fraction"]), bool(stored["settled"])
+        return Start(balls, fraction, settled=settled, reused=True)
+    except (SpecError, ValueError, TypeError, KeyError):
         return None
 
 

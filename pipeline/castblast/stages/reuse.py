@@ -56,3 +56,8 @@ def is_valid(folder: Path, key: Mapping[str, str]) -> bool:
 def mark_valid(folder: Path, key: Mapping[str, str]) -> None:
     """Remember what a finished folder was made from; call it last."""
     write_text(folder / _KEY_FILE, json.dumps(dict(key), indent=2, sort_keys=True) + "\n")
+
+
+def forget(folder: Path) -> None:
+    """Take the mark of `mark_valid` away: the next run makes the folder anew."""
+    (folder / _KEY_FILE).unlink(missing_ok=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from castblast.blast import BlastResult, BlastSettings, make_case, result_values
 from castblast.design import as_columns, require_possible
 from castblast.errors import SimulationError, Status
 from castblast.extras import require
-from castblast.files import write_csv, write_text
+from castblast.files import require_writable, write_csv, write_text, written_together
 from castblast.hole import expanded_hole_faults
 from castblast.inputs import resolve_inputs
 from castblast.nearfield.case import EndMode, TensionMode
@@ -67,6 +68,8 @@ def simulate(
         spacing.
     CheckError
         An inconsistent explosive, unless `allow_inconsistent`.
+    OutputError
+        The folder cannot be written to, or the disk is full.
     SimulationError
         The run did not reach its end state.
     """
@@ -83,6 +86,8 @@ def simulate(
         parameter_set=parameter_set,
     )
     case = make_case(products, inputs, settings)
+    if out is not None:
+        require_writable(out)
     result = interruptible(run_blast, case)
     document = _document(spec.name, mode, parameter_set, inputs, result)
     status = Status(result.status)
@@ -98,7 +103,9 @@ def simulate(
     if inputs["charge_diameter"] < inputs["hole_diameter"]:
         remarks.append("decoupled charge: the work of the gas on the air gap is neglected")
     remarks.append(BAND_WORDS)
-    files = [] if out is None else _write(out, document, result)
+    files = []
+    if out is not None:
+        files = written_together(out, partial(_write, document=document, result=result))
     title = f"{spec.name}, {mode} mode, {parameter_set} parameters"
     return SimulationOutcome(document, title, _rows(document), remarks, files)
 
