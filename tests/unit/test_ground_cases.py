@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from castblast.cli import main
 from castblast.errors import CastblastError, SpecError
 from castblast.muckpile.bench import Bench
 from castblast.muckpile.terrain import surface_faults
@@ -163,6 +164,21 @@ def test_points_of_other_tools_are_the_control(name: str) -> None:
     for one, two in zip(found[:3], expected[:3], strict=True):
         np.testing.assert_array_equal(one, two)
     assert ("no heads" in "".join(found.remarks)) == (name == "g8_no_head.csv")
+
+
+def test_other_columns_of_a_scan_are_left_out(tmp_path: Path) -> None:
+    """Numbers of points before, colours behind; without heads the first three columns count."""
+    lines = (CASES / "g8_ramp_control.csv").read_text().splitlines()
+    named = [
+        "point;X;Y;Z;R;class",
+        *(f"P{k};{v.replace(',', ';')};12;rock" for k, v in enumerate(lines[1:])),
+    ]
+    (tmp_path / "named.txt").write_text("\n".join(named))
+    bare = [f"{v.replace(',', ' ')} 12 0.5" for v in lines[1:]]
+    (tmp_path / "bare.xyz").write_text("\n".join(bare))
+    for name in ("named.txt", "bare.xyz"):
+        found = read_heights(tmp_path / name)
+        np.testing.assert_array_equal(found.height, control("g8_ramp_control.csv").height)
 
 
 @pytest.mark.parametrize("name", ["g8_mm.csv", "g8_ramp_mm.csv"])
@@ -331,6 +347,23 @@ def test_a_surface_in_the_grid_of_the_mine_is_refused_with_its_offset(
         ground(file, tmp_path, shift=[*shift[:2], "0 m"])
     with pytest.raises(SpecError, match=r"g8_control.csv: lies 7,403 km from the bench"):
         ground("g8_control.csv")
+
+
+def test_the_command_line_refuses_it_before_packing(
+    tmp_path: Path, sound: np.ndarray, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One line, exit code 2, nothing written."""
+    bench = tmp_path / "bench.yaml"
+    bench.write_text(
+        "name: far\nvelocity: 9 m/s\nballs: {count: 120}\nground: far.stl\n"
+        "bench: {length: 12 m, width: 6 m, height: 6 m, burden: 3 m, spacing: 3 m}\n"
+    )
+    stl(tmp_path / "far.stl", sound + GRID)
+    assert main(["muckpile", str(bench), "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err.strip().splitlines()
+    assert len(said) == 1
+    assert said[0].startswith(f"error: {tmp_path / 'far.stl'}: lies 7,403 km from the bench")
+    assert not (tmp_path / "out").exists()
 
 
 def test_single_precision_in_the_grid_of_the_mine_is_said(

@@ -74,6 +74,7 @@ def _read_table(path: Path) -> tuple[Table, tuple[str, ...]]:
         aliases={head: name for name, heads in _HEADS.items() for head in heads},
         ids=("id", "point", "point_id", "no", "nr", "number"),
         bare=True,
+        loose=True,  # colours, classes and intensities of a scan
         chosen={"x": "1", "y": "2", "z": "3"} if bare else {},
     )
     remark = "no heads: the first three columns are taken as x, y, z" if bare else ""
