@@ -142,6 +142,28 @@ def test_a_damaged_store_is_made_again(source, counted, tmp_path: Path) -> None:
     assert names == ["second"]
 
 
+@pytest.mark.skipif(os.name == "nt", reason="POSIX modes")
+def test_without_a_cache_each_fit_is_still_made_once(
+    source, counted, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No private folder for the store: the fits come back from their processes."""
+    (tmp_path / "blocked").write_text("")
+    monkeypatch.setenv("CASTBLAST_CACHE_DIR", str(tmp_path / "blocked"))
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    (tmp_path / f"castblast-{os.geteuid()}-kept").mkdir()
+    (tmp_path / f"castblast-{os.geteuid()}-kept").chmod(0o777)
+    assert not kept.keep(tmp_path / "any", b"thing")
+    dataset, specs = source
+    names = counted()
+    outcome = train(dataset, specs[1:], tmp_path / "fits", workers=2)
+    assert [row[0] for row in outcome.rows] == ["second", "third"]
+    assert names == [], "made by the processes, not once more here"
+    assert (tmp_path / "fits" / "third" / "fit.json").is_file()
+    train(dataset, specs[1:2], tmp_path / "fits")
+    assert names == ["second"], "nothing is kept"
+
+
 def test_a_folder_of_fits_is_compared_as_it_stands(source, whole: Path, counted) -> None:
     """The fits know their specs and where their dataset lies."""
     names = counted()

@@ -1,5 +1,6 @@
 """Files from a stranger run nothing: no planted pickle is opened, no named function called."""
 
+import ast
 import json
 import os
 import pickle
@@ -145,3 +146,35 @@ def test_a_network_or_a_folder_of_fits_of_a_stranger_runs_nothing(
     assert run("compare", stranger, "--out", data / "out", *OPTIONS) == 2
     assert capsys.readouterr().err.count("kind custom runs Python code, os:mkdir") == 2
     assert not list(trace.iterdir())
+
+
+def _opens_code(node: ast.AST) -> bool:
+    """Whether a call may run what it reads: loading of pickles, or of text as code."""
+    if not isinstance(node, ast.Call):
+        return False
+    said = ast.unparse(node.func)
+    module, _, name = said.rpartition(".")
+    if module.rpartition(".")[2] in (
+        "pickle",
+        "joblib",
+        "dill",
+        "cloudpickle",
+        "marshal",
+        "shelve",
+    ):
+        return name in ("load", "loads", "open", "Unpickler")
+    if said in ("torch.load", "eval", "exec", "yaml.unsafe_load", "yaml.full_load"):
+        return True
+    return any(
+        word.arg == "allow_pickle" and ast.unparse(word.value) != "False" for word in node.keywords
+    )
+
+
+def test_pickles_are_opened_in_one_place_only(repository: Path) -> None:
+    """In the store of fits, which asks the seal first; nothing else turns a file into code."""
+    found = {
+        path.stem
+        for path in (repository / "pipeline" / "castblast").rglob("*.py")
+        if any(map(_opens_code, ast.walk(ast.parse(path.read_text(encoding="utf-8")))))
+    }
+    assert found == {"fit_store"}
