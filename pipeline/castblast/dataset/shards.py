@@ -13,7 +13,6 @@ import hashlib
 import re
 import threading
 import time
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,8 +22,9 @@ from numpy.typing import NDArray
 
 from castblast.dataset.meter import peak_memory, process_name
 from castblast.dataset.simulation import HISTORY_NAMES, BatchResult, FloatArray, Simulator
-from castblast.errors import DatasetError
+from castblast.errors import DatasetError, SpecError
 from castblast.files import write_with
+from castblast.reading import read_npz
 
 _NAME = re.compile(r"shard-(\d{9})-(\d{9})\.npz")
 _ORIGIN, _SEAL = "rows_sha256", "seal"
@@ -155,11 +155,9 @@ def read_shard(
     """
     path = folder / span.file_name
     try:
-        with np.load(path, allow_pickle=False) as stored:
-            arrays = {str(name): stored[name] for name in stored.files}
-    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile) as fault:
-        message = f"{path}: is missing, cut or damaged ({type(fault).__name__})"
-        raise DatasetError(message) from None
+        arrays = read_npz(path, "a shard of a dataset")
+    except SpecError as fault:
+        raise DatasetError(str(fault)) from None
     origin, seal = str(arrays.pop(_ORIGIN, "")), str(arrays.pop(_SEAL, ""))
     if origin != rows_sha256:
         message = f"{path}: was made from something else"

@@ -20,6 +20,7 @@ from castblast.extras import require
 from castblast.files import write_text, write_with
 from castblast.network import Network
 from castblast.progress import ProgressCallback, silent
+from castblast.reading import read_json
 from castblast.resources import SHIPPED_NETWORKS, is_bare_name, resource
 from castblast.stages.fitting import FIT_FILE
 
@@ -165,12 +166,11 @@ def find_network(fit: Path) -> Path:
         return resource(SHIPPED_NETWORKS[str(fit)])
     comparison = fit / "comparison.json"
     if comparison.is_file():
-        try:
-            chosen = json.loads(comparison.read_text(encoding="utf-8"))["chosen"]
-        except (ValueError, KeyError, TypeError):
+        found = read_json(comparison)
+        if not isinstance(found, dict) or "chosen" not in found:
             message = f"{comparison}: does not name a chosen model; compare again"
-            raise SpecError(message) from None
-        if chosen is None:
+            raise SpecError(message)
+        if found["chosen"] is None:
             message = f"{comparison}: no model passed the physics gate, so none is chosen"
             raise SpecError(message)
     if (fit / "network.json").is_file():
