@@ -71,6 +71,10 @@ def square(x: float, name: str = "a") -> str:
             "polygons:\n  - {name: a, corners: [[-4, .nan], [-3, 0], [-2, 0]]}",
             "'a': a corner is not a finite number",
         ),
+        (
+            "polygons:\n  - {name: a, corners: [[-4, 1e300], [-3, 0], [-2, 0]]}",
+            "is 1e+297 km long, beside a bench of 84 m",
+        ),
     ],
 )
 def test_faults_of_yaml(tmp_path: Path, text: str, line: str) -> None:

@@ -119,6 +119,8 @@ def _size_fault(size: float, side: float, inside: bool) -> str:
 
 def shown_length(length: float) -> str:
     """Write a length as people do: ``7,403 km``, ``120 m``, ``4.2 cm``."""
+    if length >= 1e9:
+        return f"{length * 1e-3:.3g} km"
     if length >= 1e4:
         return f"{length * 1e-3:,.0f} km"
     return f"{length:.3g} m" if length >= 1.0 else f"{length * 1e2:.3g} cm"
