@@ -209,14 +209,14 @@ def test_columns_that_the_user_maps(tmp_path: Path) -> None:
 
 
 def test_a_hostile_table_is_one_line_at_once(tmp_path: Path) -> None:
-    start = time.perf_counter()
+    start = time.process_time()
     long = said(tmp_path, b"x [m]\n" + b"1," * (50 * 2**20) + b"\n")
     assert long == f"line 2: {100 * 2**20 + 1:,} characters; at most {LONGEST_LINE:,}"
     wide = said(tmp_path, "x," * 200_000 + "x\n1\n")
     assert wide == f"line 1: 200,001 columns; at most {MOST_COLUMNS:,}"
     cell = said(tmp_path, "x [m]\n" + "1" * 200_000 + "\n")
     assert cell.startswith("line 2: is no CSV: field larger than field limit")
-    assert time.perf_counter() - start < 10.0
+    assert time.process_time() - start < 10.0
 
 
 @given(st.binary(max_size=300) | st.text(max_size=300).map(str.encode))
