@@ -1,6 +1,6 @@
 """Whatever stands in a binary file, reading it ends with a result or with a fault in words.
 
-Archives of arrays (balls, heights) and datasets in netCDF. Datasets are changed through
+Archives of arrays (balls, heights, restarts) and datasets in netCDF. Datasets are changed through
 the library, entry by entry, or cut: bytes turned inside HDF5 are for its own developers to survive.
 """
 
@@ -21,6 +21,7 @@ from hypothesis import strategies as st
 
 from castblast.dataset.extend import read_existing
 from castblast.dataset.store import open_dataset
+from castblast.muckpile.restart import read_restart
 from castblast.reading import read_npz
 from castblast.specs.ball_files import read_balls
 from castblast.specs.ground import GroundSpec, read_ground
@@ -45,6 +46,7 @@ _READERS: dict[str, tuple[dict[str, Any], Callable[[Path], Any]]] = {
             (GroundSpec.model_validate({"heightmap": path.name}),), path.parent
         ),
     ),
+    "restart": ({**_BALLS, "case": np.array("key")}, lambda path: read_restart(path, "key")),
 }
 
 
@@ -77,7 +79,7 @@ _ARRAYS = st.one_of(
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("kind", ["balls", "heights"])
+@pytest.mark.parametrize("kind", ["balls", "heights", "restart"])
 def test_archives_of_other_arrays(kind: str) -> None:
     arrays, read = _READERS[kind]
     changes = st.dictionaries(st.sampled_from([*arrays, "v", "block"]), _ARRAYS, max_size=3)
