@@ -12,7 +12,7 @@ import io
 import os
 import shutil
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from uuid import uuid4
 
@@ -87,6 +87,26 @@ def require_writable(folder: Path) -> None:
     except OSError as fault:
         message = f"{folder}: cannot be written to: {fault.strerror or fault}"
         raise OutputError(message) from None
+
+
+@contextmanager
+def tried(folder: Path) -> Iterator[None]:
+    """Make sure that `folder` can be written to; if the work fails, no new empty folder stays.
+
+    Raises
+    ------
+    OutputError
+        As `require_writable`.
+    """
+    is_new = not folder.exists()
+    require_writable(folder)
+    try:
+        yield
+    except BaseException:
+        if is_new:
+            with suppress(OSError):  # it is not empty
+                folder.rmdir()
+        raise
 
 
 @contextmanager

@@ -16,6 +16,7 @@ from castblast.files import (
     UNFINISHED,
     require_writable,
     staged,
+    tried,
     write_text,
     write_with,
     written_together,
@@ -127,6 +128,16 @@ def test_what_is_kept_is_gone_on_with(tmp_path: Path) -> None:
         stop_after(write_text(scratch / "two.txt", "2"))
     with staged(tmp_path) as scratch:
         assert list(scratch.iterdir()) == []
+
+
+def test_no_empty_folder_stays_of_work_that_failed(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with pytest.raises(ZeroDivisionError), tried(out):
+        raise ZeroDivisionError
+    assert not out.exists()
+    with pytest.raises(KeyboardInterrupt), tried(out):
+        stop_after(write_text(out / "packing.npz", "kept"))
+    assert [path.name for path in out.iterdir()] == ["packing.npz"]
 
 
 def test_several_files_are_written_together(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from castblast.errors import SimulationError, SpecError, Status
-from castblast.files import publish, require_writable, staged
+from castblast.files import publish, staged, tried
 from castblast.locks import LOCK_NAME, only_writer
 from castblast.muckpile.bench import Bench
 from castblast.muckpile.enclosure import rock_walls
@@ -125,7 +125,6 @@ def run_muckpile(
     walls = bench_surroundings(spec, geometry, ground)
     plan = make_plan(spec, geometry, path.parent, one_speed=velocity is not None)
     folder = Path("runs") / spec.name if out is None else out
-    require_writable(folder)
     job = _Job(
         spec=spec,
         bench=geometry,
@@ -139,7 +138,7 @@ def run_muckpile(
         threads=threads or 0,
     )
     packings = folder / "packings" if packings is None else packings
-    with only_writer(folder / LOCK_NAME, folder):
+    with tried(folder), only_writer(folder / LOCK_NAME, folder):
         with deferred_stop() as stop:
             report = _long_part(progress, 0.0, _PACKING_SHARE)
             start, case, more = _prepare(job, packings, report, stop)

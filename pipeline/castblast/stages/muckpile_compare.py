@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from castblast.errors import SpecError
-from castblast.files import require_writable, write_text, written_together
+from castblast.files import require_writable, tried, write_text, written_together
 from castblast.locks import LOCK_NAME, only_writer
 from castblast.muckpile.metrics import UNITS, Band, band
 from castblast.muckpile.profile import Profile
@@ -119,8 +119,7 @@ def run_seeds(
     folders: list[Path] = []
     files: list[Path] = []
     remarks: list[str] = []
-    require_writable(folder)
-    with only_writer(folder / LOCK_NAME, folder):
+    with tried(folder), only_writer(folder / LOCK_NAME, folder):
         for k in range(seeds):
             each = folder / f"seed_{first + k}"
             folders.append(each)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from castblast.errors import SpecError
-from castblast.files import require_writable, staged, write_csv, write_text, write_with
+from castblast.files import staged, tried, write_csv, write_text, write_with
 from castblast.locks import LOCK_NAME, only_writer
 from castblast.muckpile.bench import Bench
 from castblast.muckpile.case import CastCase
@@ -145,8 +145,8 @@ def measure_muckpile(
     if around.remarks:
         document |= {"ground_remarks": list(around.remarks)}
     folder = Path("runs") / spec.name if out is None else out
-    require_writable(folder)
     with (
+        tried(folder),
         only_writer(folder / LOCK_NAME, folder),
         staged(folder, replaces=_REPLACED, name=_SCRATCH) as scratch,
     ):
