@@ -2,9 +2,10 @@
 
     python pipeline/studies/mesh_study.py            # about two minutes on two cores
 
-Designs are drawn from the full recipe by the dataset's own functions. Every setting is compared
-with a mesh of 1,152 zones. Cost is counted, not timed: zones in motion summed over the steps. The
-tables and figures of `pipeline/docs/mesh_study.md` are written by this script, between its marks.
+Designs are drawn from the full recipe by the dataset's own functions; rock that yields in the wave
+front has a study of its own, `front_study.py`. Every setting is compared with a mesh of 1,152
+zones. Cost is counted, not timed: zones in motion summed over the steps. The tables and figures of
+`pipeline/docs/mesh_study.md` are written by this script, between its marks.
 """
 
 from __future__ import annotations
@@ -17,14 +18,13 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from study_cases import ROOT, draw_cases
 
-from castblast.blast import BlastCase, BlastSettings, make_case
-from castblast.dataset.design import make_design
-from castblast.dataset.provenance import load_explosives
-from castblast.dataset.simulation import blast_simulator
+from castblast.blast import BlastCase
 from castblast.errors import Status
 from castblast.explosive.isentrope import pressure
 from castblast.files import write_text
+from castblast.nearfield.case import NearFieldSettings
 from castblast.nearfield.march import Annulus, March, march
 from castblast.nearfield.outcome import STATE_NAMES, WINDOW, end_state, mean_over
 from castblast.nearfield.setup import (
@@ -32,15 +32,15 @@ from castblast.nearfield.setup import (
     EQUILIBRIUM_REACH,
     EQUILIBRIUM_WIDTH,
     EQUILIBRIUM_ZONES,
+    FRONT_REACH,
+    FRONT_ZONES,
 )
 from castblast.nearfield.solver import _annulus
 from castblast.report.style import CYCLE, GREY, in_style, new_figure, save_figure
-from castblast.specs.recipe import load_recipe
 
 FloatArray: TypeAlias = NDArray[np.float64]
 Change: TypeAlias = Callable[[Annulus], Annulus]
 
-ROOT = Path(__file__).resolve().parent.parent.parent
 PAGE = ROOT / "pipeline/docs/mesh_study.md"
 STUDY_SEED, CHECK_SEED = 7, 99
 REFERENCE_ZONES, SECOND_ZONES = 1152, 576
@@ -79,20 +79,6 @@ class Outcome(NamedTuple):
     zone_steps: FloatArray
     steps: FloatArray
     residual: FloatArray
-
-
-def draw_cases(size: int, seed: int, name: str = "full") -> list[BlastCase]:
-    """Draw designs of a recipe, all explosives equally often."""
-    source = load_recipe(ROOT / f"data_specs/recipes/{name}.yaml", size)
-    recipe = source.recipe.model_copy(update={"seed": seed})
-    explosives = tuple(entry.spec.to_explosive() for entry in load_explosives(source))
-    simulator = blast_simulator(recipe, explosives)
-    design = make_design(recipe, simulator, name)
-    rows = [{name: float(column[i]) for name, column in design.inputs.items()} for i in range(size)]
-    return [
-        make_case(explosives[kind], row, BlastSettings())
-        for kind, row in zip(design.explosive, rows, strict=True)
-    ]
 
 
 def annuli(cases: Sequence[BlastCase], zones: int = 0) -> list[Annulus]:
@@ -180,7 +166,9 @@ def with_mesh(zones: int, width: float = 1.0, reach: float = 1.0) -> Change:
     """Other number of zones; factors on the width at the wall and on the reach."""
 
     def change(a: Annulus) -> Annulus:
-        return a._replace(zones=zones, first_width=a.first_width * width, reach=a.reach * reach)
+        return a._replace(
+            zones=float(zones), first_width=a.first_width * width, reach=a.reach * reach
+        )
 
     return change
 
@@ -189,16 +177,22 @@ def uniform_width(zones: int, width: float) -> Change:
     """Geometric mesh with the same width at the wall [hole radii] in every rock."""
 
     def change(a: Annulus) -> Annulus:
-        return a._replace(zones=zones, first_width=width * a.inner_radius, reach=float("inf"))
+        return a._replace(
+            zones=float(zones), first_width=width * a.inner_radius, reach=float("inf")
+        )
 
     return change
 
 
 def with_viscosity(linear: float, quadratic: float) -> Change:
-    """Other viscosities."""
+    """Other viscosities; of the linear one a rock gets the same share as of the default."""
+    usual = NearFieldSettings().linear_viscosity
 
     def change(a: Annulus) -> Annulus:
-        material = a.material._replace(linear_viscosity=linear, quadratic_viscosity=quadratic)
+        share = a.material.linear_viscosity / usual
+        material = a.material._replace(
+            linear_viscosity=share * linear, quadratic_viscosity=quadratic
+        )
         return a._replace(material=material)
 
     return change
@@ -290,7 +284,7 @@ def put(page: str, name: str, lines: Sequence[str]) -> str:
 def study(
     cases: Sequence[BlastCase], checks: dict[str, list[BlastCase]], figures: Path
 ) -> dict[str, list[str]]:
-    """Run everything; tables by name."""
+    """Rock whose front stays elastic; tables by name."""
     default = Setting("default", keep)
     n = EQUILIBRIUM_ZONES
     fine = run_all(cases, default, REFERENCE_ZONES)
@@ -330,6 +324,8 @@ def describe_default() -> list[str]:
         f"    (first + g y) (1 + y / {EQUILIBRIUM_REACH:g})",
         f"    first = {EQUILIBRIUM_WIDTH:g} (x^2 + 0.3^2)^(1/4) / (1 + (x / 6)^2)^(1/4)",
         "",
+        f"and in rock that yields in the wave front {FRONT_ZONES} zones, with {FRONT_REACH:g} in "
+        f"place of {EQUILIBRIUM_REACH:g}",
     ]
 
 

@@ -79,6 +79,10 @@ LIMITS = {
     "ramp_energy": (2e-4, 1e-3),
     "equilibrium_time": (2.5e-3, 4e-3),
 }
+#: Sweeps along which the solution itself bends, and the factor on the limit at every fifth point.
+#: Weak rock begins to yield in the wave front near 36 degrees (I of 0.92). The mesh does not make
+#: that: the jump of the pressure is 1.2e-3 by default, 1.7e-3 on 448 and 1.8e-3 on 900 zones.
+BENDS = {("weak", "friction_angle"): 2.0}
 #: Radii of any yield at all: the edge of a zone of next to no plastic strain, rough by nature.
 YIELD_RADII = ("plastic_zone_radius", "hoop_crushed_radius")
 
@@ -98,6 +102,11 @@ def jumps(y: np.ndarray, spacing: int) -> np.ndarray:
     second = y[2 * s :] - 2.0 * y[s:-s] + y[: -2 * s]
     departure = second[s:-s] - 0.5 * (second[2 * s :] + second[: -2 * s])
     return np.abs(departure) / np.abs(y[2 * s : -2 * s])
+
+
+def bend_of(sweep: Sweep, spacing: int) -> float:
+    """Factor on a limit: 1, but where the solution itself bends."""
+    return BENDS.get((sweep.design, sweep.name), 1.0) if spacing == FIFTH else 1.0
 
 
 def design_columns(design: str, name: str, values: np.ndarray) -> dict[str, np.ndarray]:
@@ -146,8 +155,9 @@ def test_second_differences_are_free_of_jumps(sweeps: list[Sweep], target: str) 
         f"{sweep.design} rock, {sweep.name}: jump {found.max():.1e} at point "
         f"{found.argmax() + 2 * spacing} of spacing {spacing}, allowed {limit:.0e}"
         for sweep in sweeps
-        for spacing, limit in zip((NEXT, FIFTH), LIMITS[target], strict=True)
-        if (found := jumps(sweep.outputs[target], spacing)).max() > limit
+        for spacing, usual in zip((NEXT, FIFTH), LIMITS[target], strict=True)
+        if (found := jumps(sweep.outputs[target], spacing)).max()
+        > (limit := usual * bend_of(sweep, spacing))
     ]
     assert not rough, "\n".join(rough)
 

@@ -31,6 +31,7 @@ BASE_ROCK = Rock(
     dilation_angle=0.0,
     tensile_strength=0.0,
 )
+QUADRATIC = NearFieldSettings().quadratic_viscosity
 #: In-hole velocity of detonation of ANFO at 150 mm [m/s].
 IN_HOLE_VELOCITY = 4084.0
 
@@ -57,6 +58,7 @@ def blast(product=ANFO, of=BASE_ROCK, hole=None, **settings) -> NearFieldResult:
 def annulus(
     of=BASE_ROCK, *, inner=1.0, outer=30.0, zones=100, first=0.05, start=0.0, target=1e5,
     rise=0.0, end, in_situ=0.0, quiet=True, linear=0.15, courant=0.85, elastic=False,
+    quadratic=QUADRATIC,
 ):  # fmt: skip
     """Annulus under a prescribed wall pressure, tension carried up to the apex of the cone."""
     ucs = 1e18 if elastic else of.ucs
@@ -67,14 +69,14 @@ def annulus(
         ucs,
         float(apex_tension(ucs, of.friction_angle)),
         False,
-        1.5,
+        quadratic,
         linear,
     )
     load = WallLoad(False, ANFO.isentrope, inner, start, target, rise)
     return Annulus(
         material, float(friction_number(of.friction_angle)),
-        float(friction_number(of.dilation_angle)), inner, outer, first, np.inf, zones, in_situ,
-        quiet, load, end, 1.8, courant, 5_000_000,
+        float(friction_number(of.dilation_angle)), inner, outer, first, np.inf, float(zones),
+        in_situ, quiet, load, end, 1.8, courant, 5_000_000,
     )  # fmt: skip
 
 

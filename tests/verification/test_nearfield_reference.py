@@ -25,9 +25,11 @@ HISTORY = {10: (0.015, 0.003), 25: (0.005, 0.002), 50: (0.005, 0.002), 75: (0.00
 
 @pytest.mark.parametrize("row", CASES, ids=lambda row: f"case {row['case']}")
 def test_converged_cases_of_another_code(row: dict[str, str]) -> None:
-    """Fourteen cases, `paper` mode, of an independent code (1,024 zones, Cauchy stress).
+    """Eighteen cases, `paper` mode, of an independent code (1,024 zones, Cauchy stress).
 
-    Pressure to 0.5 percent, hole radius 0.2, 1 percent strain radius 0.5, outermost shear yield 2,
+    Cases 2, 9 and 15 to 18 yield in the wave front. With a viscosity over a physical length case 15
+    was off by 1.4 percent in pressure, 0.45 in hole radius and 1.2 in the 1 percent strain radius.
+    Pressure to 0.3 percent, hole radius 0.1, 1 percent strain radius 0.5, outermost shear yield 2,
     gas work 0.5, all plastic work (shear and tension, which that code does not separate) 1, and
     the same end time. Ours has Kirchhoff stress and 256 zones. Pressure and radius on the way at
     10 to 75 percent of that time, so that an end state reached by a wrong path does not pass.
@@ -46,8 +48,8 @@ def test_converged_cases_of_another_code(row: dict[str, str]) -> None:
     dissipated = result.plastic_work + result.tensile_work
     assert result.status == Status.OK
     assert result.end_time == pytest.approx(v["end_ms"] * 1e-3, rel=1e-6)
-    assert result.equilibrium_pressure == pytest.approx(v["pressure_MPa"] * 1e6, rel=0.005)
-    assert result.expanded_hole_radius == pytest.approx(v["radius_ratio"] * radius, rel=0.002)
+    assert result.equilibrium_pressure == pytest.approx(v["pressure_MPa"] * 1e6, rel=0.003)
+    assert result.expanded_hole_radius == pytest.approx(v["radius_ratio"] * radius, rel=0.001)
     assert result.crushed_zone_radius == pytest.approx(v["crushed_ratio"] * radius, rel=0.005)
     assert result.plastic_zone_radius == pytest.approx(v["plastic_ratio"] * radius, rel=0.02)
     assert result.gas_work == pytest.approx(v["work_MJ_m"] * 1e6, rel=0.005)
@@ -61,8 +63,8 @@ def test_converged_cases_of_another_code(row: dict[str, str]) -> None:
 
 
 def test_the_reference_table_is_whole() -> None:
-    """All fourteen cases, each with every figure: a case that is lost must not go unnoticed."""
-    assert [int(row["case"]) for row in CASES] == list(range(1, 15))
+    """All eighteen cases, each with every figure: a case that is lost must not go unnoticed."""
+    assert [int(row["case"]) for row in CASES] == list(range(1, 19))
     assert all(float(text) >= 0.0 for row in CASES for key, text in row.items()
                if key != "explosive")  # fmt: skip
 

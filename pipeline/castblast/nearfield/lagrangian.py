@@ -16,23 +16,26 @@ increments would not conserve energy at the elastic strains next to a hole at se
 Strengths are those of the Cauchy stress, tau is compared with J times them. The return is made
 on logarithmic strains, whose elastic and plastic parts add because the axes never turn.
 
-**Viscosity** (von Neumann & Richtmyer 1950; Landshoff 1955; Wilkins 1980) is a pressure
+**Viscosity** is a pressure in three parts, with c the p-wave speed, d = -(volumetric strain rate)
+and d- and d+ the same in the zones on either side:
 
-    q = rho c l C_L d + rho w^2 C_Q d^2 (only where d > 0),   d = -(volumetric strain rate)
+    q = rho c l C_L d  +  rho w^2 C_Q j^2  +  rho c w C_N (d - (d- + d+) / 2)
 
-with c the p-wave speed and l = 0.04 r. The quadratic part spreads shocks. The linear part belongs
-to the model: with sin(phi) > 1 - 2 nu the non-associated flow is unstable without it (Sandler &
-Rubin 1987) and refinement makes the answer worse. The instability oscillates, so the linear part
-must act in expansion as well as in compression; and only with a length that does not shrink with
-the zones is there a solution for the mesh to converge to. Measured on rock with phi 53 degrees,
-nu 0.25, UCS 11 MPa, E 24 GPa (120, 240, 480 zones; equilibrium pressure in MPa): compression
-only, l = w: 51.7, 52.2, 53.3, diverging; both signs, l at least 0.04 r, C_L 0.3: 54.96, 54.97,
-54.98. On zones wider than that l stays 0.04 r, or a coarse mesh would have another viscosity and
-twice the error in pressure. The length changes the pressure by less than 0.1 percent in strong
-rock and by about 1 percent in the weakest (C_L 0.15 against 0.3). It is a share of the radius, so
-geometric similarity is kept. The price: outgoing waves are damped, so kinetic and elastic energy
-at the end are too low by what `viscous_work` is too high; their sum, the radiated share, is
-converged.
+*Shocks* (von Neumann & Richtmyer 1950) are spread by the quadratic part. It sees only the jump
+j = max(d - s, 0), where s = max(0, min(2 d-, 2 d+, (d- + d+) / 2, d)) is what a smooth compression
+would be (Christensen 1990; Caramana, Shashkov & Whalen 1998). *Grid noise* is damped by the last
+part, which vanishes on every field that is smooth over three zones and works in compression and
+expansion alike. Both go with the width of a zone: refining the mesh refines them.
+
+The *linear* part (Landshoff 1955) belongs to the model, over a physical length l = 0.04 r that no
+mesh changes: with sin(phi) > 1 - 2 nu the non-associated flow is unstable without it (Sandler &
+Rubin 1987) and weak rock has no answer that meshes agree on. Measured at phi 53 degrees, nu 0.25,
+UCS 11 MPa, E 24 GPa (144, 288, 576, 1,152 zones; equilibrium pressure in MPa): without it 89.7,
+90.5, 87.2, 87.1; with C_L 0.15: 87.24, 87.26, 87.26, 87.26. It acts in expansion too, because the
+instability oscillates, and it is a share of the radius, so geometric similarity is kept. The price:
+outgoing waves are damped, so kinetic and elastic energy at the end are too low by what
+`viscous_work` is too high; their sum, the radiated share, is converged. Rock that yields in the
+wave front itself must not have it and does not: see `castblast.nearfield.front`.
 """
 
 from __future__ import annotations
@@ -46,13 +49,16 @@ from castblast.kernel import fused_kernel, inline_kernel, kernel
 from castblast.nearfield.mohr_coulomb import YieldModel, edge_return
 from castblast.nearfield.zone import (
     Flow,
+    Squeeze,
     Stress,
+    Viscosity,
     deform,
     edge_flow,
     elastic,
     extent,
     hoop_compressive,
     resist,
+    squeeze_rate,
     try_one_plane,
     viscous_work,
 )
@@ -136,17 +142,22 @@ class Body(NamedTuple):
 
 
 @kernel
-def graded_radii(inner: float, outer: float, zones: int, first: float, reach: float) -> FloatArray:
+def graded_radii(
+    inner: float, outer: float, zones: float, first: float, reach: float
+) -> FloatArray:
     """Node radii of a mesh whose zones grow outwards, beyond a reach faster than within.
 
     With y the distance from the wall and i the number of a node, dy/di = (first + g y)
     (1 + y / reach), in closed form y = first E / (q - E first / reach) with E = exp(q i) - 1; q
     puts the last node on the outer radius. An infinite reach makes a geometric series.
 
+    `zones` need not be whole: of 112.4 there are 112, graded as if 0.4 more followed, and the last
+    one reaches to the outer radius. So all nodes but the last move smoothly with it.
+
     Parameters
     ----------
     inner, outer : float [m]
-    zones : int
+    zones : float
     first : float [m]
         Width of zones at the wall; a uniform mesh if it would not fit otherwise.
     reach : float [m]
@@ -154,12 +165,14 @@ def graded_radii(inner: float, outer: float, zones: int, first: float, reach: fl
 
     Returns
     -------
-    array (zones + 1,) [m]
+    array (whole zones + 1,) [m]
     """
     length = outer - inner
-    nodes = np.empty(zones + 1)
+    count = int(zones)
+    nodes = np.empty(count + 1)
+    nodes[count] = outer
     if first * (1.0 + length / reach) * zones >= length:
-        for i in range(zones + 1):
+        for i in range(count):
             nodes[i] = inner + length * i / zones
         return nodes
     share = first / reach
@@ -170,10 +183,9 @@ def graded_radii(inner: float, outer: float, zones: int, first: float, reach: fl
             high = q
         else:
             low = q
-    for i in range(zones):
+    for i in range(count):
         e = np.expm1(q * i)
         nodes[i] = inner + first * e / (q - share * e)
-    nodes[zones] = outer
     return nodes
 
 
@@ -236,11 +248,18 @@ def update_zones(
     sheared, opened, crushed = body.shear_multiplier, body.tensile_multiplier, body.hoop_multiplier
     strain, tensions = body.shear_strain, body.tension
     areas, per_area = body.initial_area, body.per_initial_area
+    velocity = body.velocity
     planes = model.planes
+    viscosity = Viscosity(material.linear_viscosity, material.quadratic_viscosity)
     per_second = 1.0 / dt
     limit, fastest, fallbacks = np.inf, 0.0, 0
     force[0] = 0.0
+    here = squeeze_rate(radius[0], radius[1], velocity[0], velocity[1])
+    before = here
     for j in range(active):
+        after = here
+        if j + 1 < widths.size:
+            after = squeeze_rate(radius[j + 1], radius[j + 2], velocity[j + 1], velocity[j + 2])
         old_width, old_mean, area = widths[j], means[j], areas[j]
         d = deform(radius[j], radius[j + 1], old_width, old_mean)
         old = Stress(radial[j], hoop[j], axial[j])
@@ -261,8 +280,8 @@ def update_zones(
         strain[j] += flow.strain
         tensions[j] = after_opening(material.brittle, flow.opening, tensions[j])
         r = resist(
-            d, stress, per_second, planes.stiffness, material.density,
-            material.linear_viscosity, material.quadratic_viscosity, area, radius[j],
+            d, stress, per_second, Squeeze(before, here, after), planes.stiffness,
+            material.density, viscosity, area, radius[j],
         )  # fmt: skip
         work[SHEAR] += area * flow.shear_work
         work[TENSION] += area * flow.tensile_work
@@ -272,6 +291,7 @@ def update_zones(
         fastest = max(fastest, max(abs(d.radial), abs(d.hoop)))
         force[j] += r.through - r.around
         force[j + 1] = -r.through - r.around
+        before, here = here, after
     return step_limit(limit, fastest, dt), fallbacks
 
 

@@ -39,6 +39,7 @@ from castblast.nearfield.lanes import (
     FORCE,
     KICK,
     LANES,
+    LAST,
     LIMIT,
     PER_SECOND,
     RADIUS,
@@ -186,7 +187,7 @@ def _start(state: Lanes, cases: Cases, lane: int, row: int, record: FloatArray) 
     for k in range(len(schedule)):
         state.schedule[lane, k] = schedule[k]
     state.charge_radius[lane], state.inner_mass[lane] = case.load.charge_radius, body.mass[0]
-    state.outer_mass[lane], state.peak[lane] = body.mass[case.zones], 0.0
+    state.outer_mass[lane], state.peak[lane] = body.mass[body.width.size], 0.0
     for k in range(state.work.shape[1]):
         state.work[lane, k] = 0.0
     record[lane, 0, 0], record[lane, 0, 1], record[lane, 0, 2] = 0.0, body.radius[0], clock.pressure
@@ -219,12 +220,11 @@ def _begin_step(state: Lanes) -> None:
 def _after_kick(state: Lanes, cases: Cases) -> int:
     """Let the waves reach their next zone and move outermost nodes; highest number of zones."""
     zones = state.zones
-    last = cases.common.zones
     most = 0
     for lane in range(LANES):
         if state.case[lane] == _IDLE:
             continue
-        active = state.active[lane]
+        active, last = state.active[lane], int(state.rows[LAST + lane])
         if active == last:
             _move_boundary(state, cases, lane)
         peak = max(state.peak[lane], abs(zones[VELOCITY + lane]))
@@ -243,7 +243,7 @@ def _move_boundary(state: Lanes, cases: Cases, lane: int) -> None:
     """Kick and move the outermost node of a lane whose wave has arrived there."""
     zones, rows = state.zones, state.rows
     case = _annulus(cases, state.case[lane])
-    here = cases.common.zones * BLOCK + lane
+    here = state.active[lane] * BLOCK + lane
     velocity, spent = kick_boundary(
         case, rows[KICK + lane], zones[here + RADIUS], case.outer_radius, zones[here + VELOCITY],
         zones[here + FORCE], state.outer_mass[lane],
@@ -346,7 +346,7 @@ def march_many(
     points : array (n, 3, history points)
         Time, pressure and radius; filled where there is an end state.
     """
-    state = _make_lanes(cases.common.zones)
+    state = _make_lanes(int(cases.holes.zones[order].max()))
     record = np.empty((LANES, 2048, 3))
     taken = running = longest = 0
     for lane in range(min(LANES, order.size)):

@@ -24,13 +24,16 @@ from castblast.nearfield.mohr_coulomb import IntArray, YieldModel, edge_return
 from castblast.nearfield.single_plane import PlaneStrength
 from castblast.nearfield.zone import (
     Deformation,
+    Squeeze,
     Stress,
+    Viscosity,
     deform,
     edge_flow,
     elastic,
     extent,
     hoop_compressive,
     resist,
+    squeeze_rate,
     try_one_plane,
     viscous_work,
 )
@@ -47,14 +50,14 @@ _ZONE_ROWS: Final = 17
 BLOCK: Final = _ZONE_ROWS * LANES
 
 # Rows of what a lane has once: constants, the step, sums; then scratch of the zone at hand.
-_LANE_ROWS: Final = 41
+_LANE_ROWS: Final = 44
 (
     FRICTION, DILATION, LAME, TWICE_SHEAR, STIFFNESS, SHEAR_COMPLIANCE, TENSILE_COMPLIANCE,
     SHEAR_STRAIN, UCS, DENSITY, LINEAR, QUADRATIC, BRITTLE, ACTIVE, KICK, STEP, PER_SECOND,
     LIMIT, FASTEST, SHEAR_WORK, TENSILE_WORK, VISCOUS_WORK, INNER, NEW_WIDTH, NEW_MEAN,
     NEW_PER_AREA, RADIAL_STRAIN, HOOP_STRAIN, NEW_RADIAL, NEW_HOOP, NEW_AXIAL, FLOW_SHEAR,
     FLOW_OPENING, FLOW_SHEAR_WORK, FLOW_TENSILE_WORK, FLOW_STRAIN, NOW_UCS, NOW_TENSION,
-    SHEAR_SHORTFALL, TENSILE_SHORTFALL, UNSOLVED,
+    SHEAR_SHORTFALL, TENSILE_SHORTFALL, UNSOLVED, LAST, BEFORE, HERE,
 ) = (row * LANES for row in range(_LANE_ROWS))  # fmt: skip
 
 
@@ -73,8 +76,11 @@ class EdgeModels(NamedTuple):
 
 @kernel
 def lane_array_sizes(zones: int) -> tuple[int, int]:
-    """Lengths of the array of the zones and of that of the lanes."""
-    return (zones + 1) * BLOCK, _LANE_ROWS * LANES
+    """Lengths of the array of the zones and of that of the lanes.
+
+    The last zone has an outer node and looks at the compression of a zone beyond it.
+    """
+    return (zones + 2) * BLOCK, _LANE_ROWS * LANES
 
 
 @lean_kernel
@@ -90,9 +96,10 @@ def kick_and_move(zones: FloatArray, lanes: FloatArray, nodes: int) -> None:
                 * zones[block + FORCE + lane]
                 * (zones[block + PER_MASS + lane])
             )
-            velocity = kicked if j < lanes[ACTIVE + lane] else velocity
-            zones[block + VELOCITY + lane] = velocity
-            zones[block + RADIUS + lane] += lanes[STEP + lane] * velocity
+            # The outermost node of a lane with fewer zones has moved with its boundary.
+            inside = j < lanes[ACTIVE + lane]
+            zones[block + VELOCITY + lane] = kicked if inside else velocity
+            zones[block + RADIUS + lane] += lanes[STEP + lane] * kicked if inside else 0.0
 
 
 @fused_kernel
@@ -110,8 +117,16 @@ def _old_stress(zones: FloatArray, here: int) -> Stress:
 
 
 @fused_kernel
-def _strain_and_return(zones: FloatArray, lanes: FloatArray, block: int) -> int:
-    """Strain, elastic trial and return by one plane of one zone in all lanes, into scratch.
+def _squeeze_rate(zones: FloatArray, here: int) -> float:
+    outer = here + BLOCK
+    return squeeze_rate(
+        zones[here + RADIUS], zones[outer + RADIUS], zones[here + VELOCITY], zones[outer + VELOCITY]
+    )
+
+
+@fused_kernel
+def _strain_and_return(zones: FloatArray, lanes: FloatArray, j: int) -> int:
+    """Strain, elastic trial and return by one plane of zone `j` in all lanes, into scratch.
 
     Returns
     -------
@@ -119,6 +134,7 @@ def _strain_and_return(zones: FloatArray, lanes: FloatArray, block: int) -> int:
         0 if that was all; else some lanes are marked `UNSOLVED`.
     """
     unsolved = 0
+    block = j * BLOCK
     for lane in range(LANES):
         here = block + lane
         planes = _planes(lanes, lane)
@@ -149,8 +165,9 @@ def _strain_and_return(zones: FloatArray, lanes: FloatArray, block: int) -> int:
         lanes[NOW_TENSION + lane] = t.tension
         lanes[SHEAR_SHORTFALL + lane] = t.shear_shortfall
         lanes[TENSILE_SHORTFALL + lane] = t.tensile_shortfall
-        lanes[UNSOLVED + lane] = 0.0 if t.solved else 1.0
-        unsolved += 0 if t.solved else 1
+        solved = t.solved | (j >= lanes[ACTIVE + lane])
+        lanes[UNSOLVED + lane] = 0.0 if solved else 1.0
+        unsolved += 0 if solved else 1
     return unsolved
 
 
@@ -160,6 +177,8 @@ def _flow_and_resist(zones: FloatArray, lanes: FloatArray, j: int) -> None:
     block = j * BLOCK
     for lane in range(LANES):
         here = block + lane
+        # A zone not yet reached does not count; beyond the last one there is none.
+        reached = j < lanes[ACTIVE + lane]
         d = Deformation(
             lanes[NEW_WIDTH + lane], lanes[NEW_MEAN + lane], lanes[NEW_PER_AREA + lane],
             lanes[RADIAL_STRAIN + lane], lanes[HOOP_STRAIN + lane],
@@ -187,23 +206,24 @@ def _flow_and_resist(zones: FloatArray, lanes: FloatArray, j: int) -> None:
         zones[here + TENSION] = after_opening(
             lanes[BRITTLE + lane] > 0.0, opening, zones[here + TENSION]
         )
+        rate = lanes[HERE + lane]
+        following = _squeeze_rate(zones, here + BLOCK) if j + 1 < lanes[LAST + lane] else rate
         r = resist(
-            d, stress, lanes[PER_SECOND + lane], lanes[STIFFNESS + lane], lanes[DENSITY + lane],
-            lanes[LINEAR + lane], lanes[QUADRATIC + lane], area, lanes[INNER + lane],
+            d, stress, lanes[PER_SECOND + lane], Squeeze(lanes[BEFORE + lane], rate, following),
+            lanes[STIFFNESS + lane], lanes[DENSITY + lane],
+            Viscosity(lanes[LINEAR + lane], lanes[QUADRATIC + lane]), area, lanes[INNER + lane],
         )  # fmt: skip
-        lanes[SHEAR_WORK + lane] += area * lanes[FLOW_SHEAR_WORK + lane]
-        lanes[TENSILE_WORK + lane] += area * lanes[FLOW_TENSILE_WORK + lane]
-        before = zones[here + VISCOUS]
-        lanes[VISCOUS_WORK + lane] += viscous_work(d, old_width, old_mean, before, r.viscous)
+        lanes[BEFORE + lane], lanes[HERE + lane] = rate, following
+        shear_work, tensile_work = lanes[FLOW_SHEAR_WORK + lane], lanes[FLOW_TENSILE_WORK + lane]
+        spent = viscous_work(d, old_width, old_mean, zones[here + VISCOUS], r.viscous)
+        lanes[SHEAR_WORK + lane] += area * shear_work if reached else 0.0
+        lanes[TENSILE_WORK + lane] += area * tensile_work if reached else 0.0
+        lanes[VISCOUS_WORK + lane] += spent if reached else 0.0
         zones[here + VISCOUS] = r.viscous
-        # A zone not yet reached does not count.
-        limit = r.limit if j < lanes[ACTIVE + lane] else np.inf
-        lanes[LIMIT + lane] = min(lanes[LIMIT + lane], limit)
-        lanes[FASTEST + lane] = max(
-            lanes[FASTEST + lane],
-            max(abs(d.radial), abs(d.hoop)),
-        )
-        zones[here + FORCE] += r.through - r.around
+        lanes[LIMIT + lane] = min(lanes[LIMIT + lane], r.limit if reached else np.inf)
+        fastest = max(abs(d.radial), abs(d.hoop))
+        lanes[FASTEST + lane] = max(lanes[FASTEST + lane], fastest if reached else 0.0)
+        zones[here + FORCE] += r.through - r.around if reached else 0.0
         zones[here + BLOCK + FORCE] = -r.through - r.around
 
 
@@ -214,12 +234,13 @@ def update_lanes(
     """Update the first `active` zones of all lanes after a move; see `lagrangian.update_zones`.
 
     `LIMIT` and `FASTEST` hold the bounds of the step afterwards. Zones that a lane has not reached
-    are computed along; at rest they change nothing.
+    are computed along and change nothing.
     """
     for lane in range(LANES):
         zones[FORCE + lane] = 0.0
+        lanes[HERE + lane] = lanes[BEFORE + lane] = _squeeze_rate(zones, lane)
     for j in range(active):
-        if _strain_and_return(zones, lanes, j * BLOCK) > 0:
+        if _strain_and_return(zones, lanes, j) > 0:
             _return_to_edges(zones, lanes, j * BLOCK, edges, fallbacks)
         _flow_and_resist(zones, lanes, j)
 
@@ -275,6 +296,7 @@ def load_lane(
             for j in range(3):
                 edges.inverse[lane, k, i, j] = model.inverse[k, i, j]
     last = body.width.size
+    lanes[LAST + lane] = last
     for j in range(last + 1):
         here = j * BLOCK + lane
         zones[here + RADIUS] = body.radius[j]

@@ -86,7 +86,8 @@ class Annulus(NamedTuple):
         N of the friction and of the dilation angle.
     inner_radius, outer_radius, first_width, reach : float [m]
         The mesh, see `graded_radii`.
-    zones : int
+    zones : float
+        See `graded_radii`.
     in_situ_stress : float [Pa]
     quiet : bool
         Quiet outer boundary; False: free surface under the in-situ stress.
@@ -107,7 +108,7 @@ class Annulus(NamedTuple):
     outer_radius: float
     first_width: float
     reach: float
-    zones: int
+    zones: float
     in_situ_stress: float
     quiet: bool
     load: WallLoad
@@ -167,7 +168,7 @@ def _kick(body: Body, active: int, dt: float, case: Annulus, work: FloatArray) -
 
     The node at the edge of the active zones rests: the force of the next zone is not known there.
     """
-    last = case.zones
+    last = body.width.size
     for i in range(active):
         body.velocity[i] += dt * body.force[i] * body.per_mass[i]
     if active == last:
@@ -228,7 +229,7 @@ def prepare(case: Annulus) -> tuple[Body, YieldModel, FloatArray, Clock, int]:
     )
     body = make_body(nodes, material, model, case.in_situ_stress)
     work = np.zeros(LEDGER_SIZE)
-    active = min(FIRST_ZONES, case.zones)
+    active = min(FIRST_ZONES, body.width.size)
     transit = body.width[0] / np.sqrt(model.planes.stiffness / material.density)
     update_zones(body, active, 1e-9 * transit, material, model, work)
     full = full_pressure(load, body.radius[0])
@@ -266,7 +267,7 @@ def march(case: Annulus) -> March:
             clock = last_step(clock)
         _kick(body, active, 0.5 * (clock.previous_step + clock.step), case, work)
         peak = max(peak, abs(body.velocity[0]))
-        if active < case.zones and abs(body.velocity[active - 1]) > AT_REST * peak:
+        if active < body.width.size and abs(body.velocity[active - 1]) > AT_REST * peak:
             active += 1
         old_radius = body.radius[0]
         for i in range(active + 1):

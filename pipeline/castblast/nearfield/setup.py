@@ -22,6 +22,7 @@ from castblast.nearfield.case import (
     NearFieldSettings,
     TensionMode,
 )
+from castblast.nearfield.front import front_number, regularised_share
 from castblast.nearfield.lagrangian import Material
 from castblast.nearfield.march import Annulus, WallLoad
 from castblast.nearfield.mohr_coulomb import apex_tension, friction_number
@@ -40,6 +41,9 @@ PAPER_ZONES, PAPER_WIDTH = 256, 0.04
 EQUILIBRIUM_ZONES, EQUILIBRIUM_WIDTH = 112, 0.2325
 #: Distance from the wall, in hole radii, over which the mesh of the equilibrium mode stays fine.
 EQUILIBRIUM_REACH = 100.0
+#: Zones and reach of the equilibrium mode in rock that yields in the wave front, which has to stay
+#: sharp on all of its way. The zones at the wall, which set the step, are no narrower for it.
+FRONT_ZONES, FRONT_REACH = 288, 250.0
 #: Share of the largest stable step.
 COURANT = 0.85
 MAX_STEPS = 300_000
@@ -63,6 +67,8 @@ class HoleParameters(NamedTuple):
     outer_radius: FloatArray
     first_width: FloatArray
     reach: FloatArray
+    zones: FloatArray
+    linear_viscosity: FloatArray
     in_situ_stress: FloatArray
     charge_radius: FloatArray
     rise_time: FloatArray
@@ -73,10 +79,8 @@ class HoleParameters(NamedTuple):
 class CommonParameters(NamedTuple):
     """What all holes of a batch share; see `Annulus` and `Material`."""
 
-    zones: int
     brittle: bool
     quadratic_viscosity: float
-    linear_viscosity: float
 
 
 def possible(
@@ -124,31 +128,31 @@ def hole_parameters(
     if settings.outer_radius == 0.0:
         outer = np.full_like(inner, PAPER_RADIUS) if paper else EQUILIBRIUM_RADII * inner
     wave_speed = np.sqrt((bulk + 4.0 / 3.0 * shear) / c.density)
-    default = _default_zones(settings)
+    share = regularised_share(front_number(friction, c.poisson_ratio))
+    usual = PAPER_ZONES if paper else EQUILIBRIUM_ZONES
+    default = usual if paper else FRONT_ZONES + share * (EQUILIBRIUM_ZONES - FRONT_ZONES)
+    zones = np.full_like(inner, settings.zones if settings.zones else default)
+    # More zones than the default refine it everywhere alike; those that rock which yields in the
+    # front has beyond the usual number go to the front, and are the first to be missing.
+    coarse = np.maximum(np.minimum(default / zones, 1.0), usual / zones)
     width = PAPER_WIDTH if paper else _wall_width(wave_speed * c.rise_time / inner)
-    reach = np.full_like(inner, np.inf) if paper else EQUILIBRIUM_REACH * inner
+    reach = FRONT_REACH + share * (EQUILIBRIUM_REACH - FRONT_REACH)
+    reach = np.full_like(inner, np.inf) if paper else reach * inner
     end = PAPER_END * (outer - inner) / wave_speed if paper else np.zeros_like(inner)
     energies = np.array([e.total_energy for e in explosives])
     return HoleParameters(
         c.density, bulk, shear, c.ucs, tension, friction, friction_number(c.dilation_angle), inner,
-        outer, width * inner * default / (settings.zones or default), reach, c.in_situ_stress,
-        0.5 * c.charge_diameter, c.rise_time, end, energies[c.explosive],
+        outer, width * inner * coarse, reach, zones, share * settings.linear_viscosity,
+        c.in_situ_stress, 0.5 * c.charge_diameter, c.rise_time, end, energies[c.explosive],
     )  # fmt: skip
 
 
 def common_parameters(settings: NearFieldSettings) -> CommonParameters:
     """Numbers that the settings give to all holes."""
     return CommonParameters(
-        int(settings.zones or _default_zones(settings)),
         bool(settings.tension == TensionMode.BRITTLE),
         float(settings.quadratic_viscosity),
-        float(settings.linear_viscosity),
     )
-
-
-def _default_zones(settings: NearFieldSettings) -> int:
-    """Zones of the end mode."""
-    return PAPER_ZONES if settings.mode == EndMode.PAPER else EQUILIBRIUM_ZONES
 
 
 def _wall_width(run: FloatArray) -> FloatArray:
@@ -171,12 +175,12 @@ def make_annulus(
     h = holes
     material = Material(
         h.density[row], h.bulk_modulus[row], h.shear_modulus[row], h.ucs[row], h.tension[row],
-        common.brittle, common.quadratic_viscosity, common.linear_viscosity,
+        common.brittle, common.quadratic_viscosity, h.linear_viscosity[row],
     )  # fmt: skip
     in_situ = h.in_situ_stress[row]
     load = WallLoad(True, isentrope, h.charge_radius[row], in_situ, 0.0, h.rise_time[row])
     return Annulus(
         material, h.friction[row], h.dilation[row], h.inner_radius[row], h.outer_radius[row],
-        h.first_width[row], h.reach[row], common.zones, in_situ, True, load, h.end_time[row],
+        h.first_width[row], h.reach[row], h.zones[row], in_situ, True, load, h.end_time[row],
         WINDOW[1], COURANT, MAX_STEPS,
     )  # fmt: skip

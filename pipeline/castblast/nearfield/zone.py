@@ -20,6 +20,8 @@ from castblast.nearfield.single_plane import PlaneStrength, single_plane_return
 
 #: The linear viscosity acts over this share of the radius, on however fine or coarse a mesh.
 VISCOUS_LENGTH = 0.04
+#: Viscosity against grid noise, over the width of a zone: acts on what differs from neighbours.
+NOISE_VISCOSITY = 0.03
 #: Share of the strength by which the hoop stress must be compressive to count as such.
 _COMPRESSIVE = 1e-6
 
@@ -95,6 +97,21 @@ class Trial(NamedTuple):
     shear_shortfall: float
     tensile_shortfall: float
     solved: bool
+
+
+class Squeeze(NamedTuple):
+    """Rate of compression of a zone and of its neighbours [1/s]."""
+
+    before: float
+    here: float
+    after: float
+
+
+class Viscosity(NamedTuple):
+    """Viscosities of a rock [-]."""
+
+    linear: float
+    quadratic: float
 
 
 class Resistance(NamedTuple):
@@ -224,14 +241,21 @@ def hoop_compressive(stress: Stress, ucs: float) -> bool:
 
 
 @fused_kernel
+def squeeze_rate(inner: float, outer: float, inner_speed: float, outer_speed: float) -> float:
+    """Rate of compression [1/s] of a zone from radii [m] and velocities [m/s] of its nodes."""
+    swept = inner * inner_speed - outer * outer_speed
+    return 2.0 * swept / ((outer - inner) * (outer + inner))
+
+
+@fused_kernel
 def resist(
     d: Deformation,
     stress: Stress,
     per_second: float,
+    squeeze: Squeeze,
     stiffness: float,
     density: float,
-    linear: float,
-    quadratic: float,
+    viscosity: Viscosity,
     initial_area: float,
     inner: float,
 ) -> Resistance:
@@ -241,10 +265,10 @@ def resist(
     ----------
     per_second : float [1/s]
         One over the step.
+    squeeze : Squeeze
     stiffness : float [Pa]
         lambda + 2 G; radial compression adds to it in the Kirchhoff law.
-    linear, quadratic : float [-]
-        Viscosities.
+    viscosity : Viscosity
     initial_area : float [m2]
     inner : float [m]
         Radius of the inner node.
@@ -253,10 +277,18 @@ def resist(
     modulus = stiffness + abs(stress.radial)
     transit = d.width * np.sqrt(density / modulus)
     rate = -(d.radial + d.hoop) * per_second
+    before, here, after = squeeze.before, squeeze.here, squeeze.after
+    usual = 0.5 * (before + after)
+    # What a smooth compression would be here; the rest of it is a jump.
+    smooth = max(0.0, min(2.0 * min(before, after), min(usual, here)))
+    jump = max(here - smooth, 0.0)
     # mean / width = mean^2 per_area
-    damping = linear * (VISCOUS_LENGTH * (d.mean * d.mean * d.per_area))
-    damping = damping + max(quadratic * transit * rate, 0.0)
-    viscous = modulus * transit * damping * rate * shrinking
+    linear = viscosity.linear * (VISCOUS_LENGTH * (d.mean * d.mean * d.per_area))
+    shock = viscosity.quadratic * transit * jump
+    noise = NOISE_VISCOSITY * (here - usual)
+    viscous = modulus * transit * (linear * rate + shock * jump + noise) * shrinking
+    # Neighbours that move against each other have twice the noise.
+    damping = linear + shock + 2.0 * NOISE_VISCOSITY
     limit = transit * (np.sqrt(1.0 + damping * damping) - damping)
     upright = (d.width > 0.0) & (inner > 0.0)
     return Resistance(
