@@ -71,6 +71,12 @@ def test_a_pile_that_moved_as_one_is_measured(bench: Path, tmp_path: Path) -> No
     assert {"section.png", "profiles.png", "ore.png", "final_state.npz"} <= names
     assert all(path.is_file() for path in found.files)
     assert ("throw of the centre of mass", "7", "m") in found.rows
+    assert found.document["velocity_source"] == "given"
+    assert found.rows[0] == (
+        "burden velocity",
+        f"{found.document['initial_velocity']:.3g}, as given",
+        "m/s",
+    )
     # Our own reader takes the state, and the comparison takes the folder.
     again = read_balls(out / "final_state.npz")
     assert again.position == pytest.approx(start.position + MOVED, abs=1e-4)

@@ -43,6 +43,7 @@ from castblast.stages.muckpile_tables import (
     pile_surface,
     profile_columns,
 )
+from castblast.stages.muckpile_velocity import describe_velocity, velocity_remarks
 from castblast.stages.reuse import file_hash
 
 #: Where decks of castblast keep the balls before firing, beside the final state.
@@ -157,7 +158,7 @@ def measure_muckpile(
         f"{spec.name}: {len(after.radius):,} balls of {final.name}",
         [row for row in rows if row[0] != _ENERGY_ROW],
         files,
-        list(around.remarks),
+        [*around.remarks, *velocity_remarks(plan.prediction)],
     )
 
 
@@ -211,7 +212,7 @@ def _document(found: _Measured, files: Mapping[str, Path]) -> dict[str, Any]:
             "geometry": found.bench._asdict(),
             "balls": len(before.radius),
             "mean_radius": float(before.radius.mean()),
-            "initial_velocity": found.plan.speed,
+            **describe_velocity(found.plan.speed, found.plan.prediction),
             "surrogate": dict(found.plan.prediction) if found.plan.prediction else None,
             **metrics._asdict(),
             "ore": describe_ore(found.ore) if found.ore else None,
