@@ -216,7 +216,8 @@ def complete_columns(values: InputColumns, count: int) -> dict[str, FloatArray]:
     full = as_columns(defaults, count) | given
     for entry in completions_of(given):
         total, size = _sum(entry.terms, full)
-        full[entry.name] = np.where(np.abs(total) <= ROUND_OFF * size, 0.0, total)
+        nothing = (np.abs(total) <= ROUND_OFF * size) & np.isfinite(size)
+        full[entry.name] = np.where(nothing, 0.0, total)
     for name, limit in _SNAPPED:
         above = full[name] > full[limit]
         close = above & (full[name] <= full[limit] * (1.0 + ROUND_OFF))

@@ -210,6 +210,15 @@ def test_a_value_that_is_no_number_is_named():
         resolve_design({"bench_height": 100.0, "charge_length": 5.0})
 
 
+def test_an_infinite_value_is_told_alone():
+    for name in ("burden", "bench_height", "hole_diameter"):
+        with pytest.raises(SpecError) as fault:
+            resolve_design({name: inf})
+        lines = str(fault.value).splitlines()
+        assert lines[0].startswith(f"{name} inf")
+        assert not any(" 0 m" in line for line in lines)
+
+
 def test_the_rule_as_data_names_inputs_only():
     data = rules_as_data()
     names = {name for entry in data["completions"] + data["rules"] for name in entry["terms"]}

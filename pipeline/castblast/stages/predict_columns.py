@@ -26,7 +26,7 @@ from castblast.design import (
     name_faults,
     require_none,
 )
-from castblast.hole import expanded_hole_faults
+from castblast.hole import breakout_width, expanded_hole_faults, mean_burden
 from castblast.network import (
     Bounds,
     DomainViolation,
@@ -47,6 +47,8 @@ from castblast.variables import INPUT_NAMES, VARIABLES
 _CHARGE = ("stemming_length", "charge_length")
 #: What a hole is as wide as when the burden begins to move.
 _EXPANSION = "expanded_hole_radius"
+#: Diameters that no hole expands to: at most 10.1 over the whole table of inputs.
+_FARTHEST = 12.0
 #: Two values of an input are the same to this relative tolerance.
 _SAME = 1e-9
 
@@ -201,6 +203,7 @@ def _completed(
     return NetworkDesigns(inputs, faults, [e for e in unseen if e.name not in _CHARGE]), full
 
 
+@np.errstate(all="ignore")  # what is no number is refused by its bounds
 def _outgrown(
     network: Network,
     numeric: Floats,
@@ -222,12 +225,13 @@ def _outgrown(
     lower = np.array([column.lower for column in network.inputs])
     upper = np.array([column.upper for column in network.inputs])
     beyond = ~((numeric >= lower) & (numeric <= upper))
-    moved = np.flatnonzero((beyond & bench).any(axis=1))
+    narrow = breakout_width(full["spacing"], mean_burden(full)) < _FARTHEST * full["hole_diameter"]
+    moved = np.flatnonzero((beyond & bench).any(axis=1) & narrow)
     if len(moved):
         near = np.where(bench, np.clip(numeric[moved], lower, upper), numeric[moved])
         answers = evaluate_rows(network, near, index[moved])
         radius[moved] = answers[:, network.output_names.index(_EXPANSION)]
-    known = ~(beyond & ~bench).any(axis=1) & ~_any_row(designs.faults, len(index))
+    known = narrow & ~(beyond & ~bench).any(axis=1) & ~_any_row(designs.faults, len(index))
     for entry in designs.unseen:  # the answer is for another hole
         known &= ~entry.rows
     faults = expanded_hole_faults(full, np.where(known, radius, np.nan))
