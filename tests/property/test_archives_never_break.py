@@ -165,7 +165,7 @@ def _apply(path: Path, changes: list[tuple[Any, ...]]) -> None:
 
 def test_datasets_with_other_entries(made: Path) -> None:
     @given(_changes(made))
-    @settings(BRIEF, max_examples=8 * TIMES)
+    @settings(BRIEF, max_examples=5 * TIMES)
     def check(changes: list[tuple[str, ...]]) -> None:
         with TemporaryDirectory() as name:
             path = Path(name) / "d.nc"
@@ -180,7 +180,7 @@ def test_datasets_that_are_cut(made: Path) -> None:
     content = made.read_bytes()
 
     @given(st.integers(0, len(content) - 1))
-    @settings(BRIEF, max_examples=8 * TIMES)
+    @settings(BRIEF, max_examples=5 * TIMES)
     def check(length: int) -> None:
         with TemporaryDirectory() as name:
             path = Path(name) / "d.nc"
