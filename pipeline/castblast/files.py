@@ -91,7 +91,7 @@ def require_writable(folder: Path) -> None:
 
 @contextmanager
 def tried(folder: Path) -> Iterator[None]:
-    """Make sure that `folder` can be written to; if the work fails, no new empty folder stays.
+    """Make sure that `folder` can be written to; a new one that stays empty is removed again.
 
     Raises
     ------
@@ -102,11 +102,10 @@ def tried(folder: Path) -> Iterator[None]:
     require_writable(folder)
     try:
         yield
-    except BaseException:
+    finally:
         if is_new:
             with suppress(OSError):  # it is not empty
                 folder.rmdir()
-        raise
 
 
 @contextmanager
