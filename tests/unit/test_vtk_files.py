@@ -27,7 +27,7 @@ def states(count: int = 7) -> list[Particles]:
 
 def test_without_vtk_the_option_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "vtkmodules.vtkIOHDF", None)
-    with pytest.raises(SpecError, match=r'--vtk: needs VTK 9.4 or later: pip install "castblast'):
+    with pytest.raises(SpecError, match=r'needs VTK 9.4 or later: pip install -U "castblast'):
         need_vtk("--vtk")
 
 
