@@ -51,7 +51,10 @@ def test_a_run_says_what_it_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     run = run_muckpile.__globals__["run_cast"]
     monkeypatch.setattr(
         "castblast.stages.muckpile.run_cast",
-        lambda case, *rest: (seen.append((case.precision, case.sleeping)), run(case, *rest))[1],
+        lambda case, *rest, **options: (
+            seen.append((case.precision, case.sleeping)),
+            run(case, *rest, **options),
+        )[1],
     )
     path = written(tmp_path)
     document = run_muckpile(path, tmp_path / "out", threads=1, precision="float64").document

@@ -58,7 +58,7 @@ import sys, time
 import castblast.stages.predict_table as stage
 from castblast.cli import main
 from castblast.stages.jobs import Job, run_jobs
-def work(path, network=None):
+def work(*arguments, **options):
     def tell(share, line):
         print("begun", flush=True)
     run_jobs([Job("one", time.sleep, (60.0,)), Job("two", time.sleep, (60.0,))], 2, tell)
