@@ -1,14 +1,13 @@
 """Run the README: its installation in a fresh environment, then every command that it shows.
 
 Sizes are cut so that all of it takes a few minutes; everything else is run as it stands. The
-commands run in a copy of the source tree, so nothing is left behind.
+environment and all results lie in a folder of their own, so nothing is left behind.
 """
 
 from __future__ import annotations
 
 import os
 import re
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -18,6 +17,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 #: What is made smaller: text of a command to its replacement.
 SMALLER = {
+    "constraints.txt": f"{ROOT}/constraints.txt",
+    '".[all]"': f'"{ROOT}[all]"',
+    "castblast generate paper": "castblast generate paper --size 2000",
     "castblast web": "castblast web --no-browser",
     "castblast compare data": "castblast compare --quick data",
     "/comparison --to": "/comparison_quick --to",
@@ -69,13 +71,7 @@ def run(command: str, folder: Path) -> None:
 def main() -> None:
     """Install and run."""
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name) / "castblast"
-        listed = subprocess.run(
-            ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True
-        )
-        for relative in filter(None, listed.stdout.split("\0")):
-            (folder / relative).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(ROOT / relative, folder / relative)
+        folder = Path(name)
         for command in (*blocks("Two commands"), *blocks("What you can do")):
             if wanted := smaller(command):
                 run(wanted, folder)
