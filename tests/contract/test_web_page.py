@@ -393,3 +393,9 @@ def test_the_shaded_range_is_where_the_design_stays_valid(ask) -> None:
         for kind, truth in zip(found["domains"], expected, strict=True):
             assert kind == truth if isinstance(truth, str) else (kind == "outside") == truth
         assert column.lower <= found["lower"] < found["upper"] <= column.upper
+    for column in network.inputs:
+        found = evaluated(
+            f"validRange({json.dumps(design)}, network.inputs.find((c) => c.name === "
+            f"'{column.name}'), ratiosOf({json.dumps(design)}))"
+        )
+        assert found["lower"] <= row[column.name] <= found["upper"], column.name

@@ -75,17 +75,22 @@ function rangeSteps({ lower, upper, log }, steps) {
 
 /**
  * Where one input may go on its slider, the others as they are, spacing and stemming with the burden:
- * the verdict at every step (also "impossible"), and the ends of what is not outside.
+ * the verdict at every step (also "impossible"), and the ends of what is not outside. The value of
+ * the design itself counts: the last step may lie a rounding beyond what is possible (90 degrees).
  */
 export function validRange(design, column, ratios, steps = 40) {
   const { name } = column;
-  const points = rangeSteps(column, steps).map((x) => {
+  const verdict = (x) => {
     const values = name === "burden" ? valuesAtBurden(design, x, ratios) : { ...design.values, [name]: x };
     const moved = { explosive: design.explosive, values };
     return { x, domain: refusals(moved, "si").length ? "impossible" : predicted(moved).domain };
-  });
-  const valid = points.filter(({ domain }) => domain === "inside" || domain === "unusual");
-  return { domains: points.map(({ domain }) => domain), lower: valid.at(0)?.x, upper: valid.at(-1)?.x };
+  };
+  const points = rangeSteps(column, steps).map(verdict);
+  const valid = [...points, verdict(design.values[name])]
+    .filter(({ domain }) => domain === "inside" || domain === "unusual")
+    .map(({ x }) => x);
+  const ends = valid.length ? { lower: Math.min(...valid), upper: Math.max(...valid) } : {};
+  return { domains: points.map(({ domain }) => domain), ...ends };
 }
 
 /** Least and greatest velocity while one input goes over its trained range; the others stay. */
