@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[1]
 SMALLER = {
     "constraints.txt": f"{ROOT}/constraints.txt",
     '".[all]"': f'"{ROOT}[all]"',
-    "castblast generate paper": "castblast generate paper --size 2000",
+    "castblast generate paper": "castblast generate paper --size 1000",
     "castblast web": "castblast web --no-browser",
     "castblast compare data": "castblast compare --quick data",
     "/comparison --to": "/comparison_quick --to",
