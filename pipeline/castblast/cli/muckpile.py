@@ -15,6 +15,25 @@ if TYPE_CHECKING:
     from castblast.stages.muckpile_results import MuckpileOutcome
 
 
+_Ore = Annotated[
+    Path | None,
+    typer.Option(
+        help="Ore polygons (YAML or CSV): ore loss, dilution and where the ore lies.",
+        show_default=False,
+    ),
+]
+_DigBlock = Annotated[
+    str | None,
+    typer.Option(help='Side of a dig block, "3 m"; default: spacing.', show_default=False),
+]
+_Flitch = Annotated[
+    str | None,
+    typer.Option(
+        help='Height of a dig block, "2.5 m"; default: the whole pile.', show_default=False
+    ),
+]
+
+
 def muckpile(
     screen: Screen,
     bench: Annotated[
@@ -60,23 +79,9 @@ def muckpile(
     seeds: Annotated[
         int, typer.Option(min=1, help="Runs with so many seeds; bands over them.")
     ] = 1,
-    ore: Annotated[
-        Path | None,
-        typer.Option(
-            help="Ore polygons (YAML or CSV): ore loss, dilution and where the ore lies.",
-            show_default=False,
-        ),
-    ] = None,
-    dig_block: Annotated[
-        str | None,
-        typer.Option(help='Side of a dig block, "3 m"; default: spacing.', show_default=False),
-    ] = None,
-    flitch: Annotated[
-        str | None,
-        typer.Option(
-            help='Height of a dig block, "2.5 m"; default: the whole pile.', show_default=False
-        ),
-    ] = None,
+    ore: _Ore = None,
+    dig_block: _DigBlock = None,
+    flitch: _Flitch = None,
     animation: Annotated[
         str | None, typer.Option(metavar="gif|mp4", help="Write an animation.", show_default=False)
     ] = None,
@@ -153,20 +158,9 @@ def measure_muckpile(
             show_default=False,
         ),
     ] = None,
-    ore: Annotated[
-        Path | None,
-        typer.Option(help="Ore polygons (YAML or CSV).", show_default=False),
-    ] = None,
-    dig_block: Annotated[
-        str | None,
-        typer.Option(help='Side of a dig block, "3 m"; default: spacing.', show_default=False),
-    ] = None,
-    flitch: Annotated[
-        str | None,
-        typer.Option(
-            help='Height of a dig block, "2.5 m"; default: the whole pile.', show_default=False
-        ),
-    ] = None,
+    ore: _Ore = None,
+    dig_block: _DigBlock = None,
+    flitch: _Flitch = None,
 ) -> Mapping[str, Any]:
     """Measure what another engine threw: throw, profile and ore from its final balls."""
     from castblast.stages.muckpile_extras import Extras
