@@ -1,11 +1,15 @@
 """Shared fixtures: floating-point faults raise, and no test may change a global default."""
 
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import redirect_stderr, redirect_stdout
+from importlib.util import find_spec
+from io import StringIO
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -15,6 +19,9 @@ if TYPE_CHECKING:
 
 os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    # So a shell script starts what ends in `&`; every process that a test starts would inherit it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -53,6 +60,49 @@ def castblast() -> Callable[..., "subprocess.CompletedProcess[str]"]:
         )
 
     return run
+
+
+@pytest.fixture(scope="session")
+def castblast_here() -> Callable[..., "subprocess.CompletedProcess[str]"]:
+    """Run the command line in this process: the same words and codes without the start-up."""
+
+    def run(*arguments: str | Path) -> "subprocess.CompletedProcess[str]":
+        from castblast.cli import main
+
+        given = [str(argument) for argument in arguments]
+        with redirect_stdout(StringIO()) as out, redirect_stderr(StringIO()) as err:
+            code = main(given)
+        return subprocess.CompletedProcess(given, code, out.getvalue(), err.getvalue())
+
+    return run
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _coarse_pictures() -> Iterator[None]:
+    """A third of the resolution: ink, words and layout are the same, most of the time is saved.
+
+    A test that draws in this process pays for the pixels of up to twelve pictures a muckpile; the
+    full size is drawn wherever a test starts the command line.
+    """
+    if not all(map(find_spec, ("matplotlib", "numba"))):
+        yield
+        return
+    from matplotlib.figure import Figure
+
+    from castblast.report.ball_picture import Canvas
+
+    save, paint = Figure.savefig, Canvas.__init__
+
+    def save_coarse(figure: Figure, *names: object, dpi: float, **options: object) -> None:
+        save(figure, *names, dpi=dpi / 3.0, **options)  # type: ignore[arg-type]
+
+    def paint_coarse(canvas: Canvas, view: Any, extent: Any, pixels: int = 1400) -> None:
+        paint(canvas, view, extent, pixels // 3 if pixels > 600 else pixels)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figure, "savefig", save_coarse)
+        patch.setattr(Canvas, "__init__", paint_coarse)
+        yield
 
 
 TOY_EXPLOSIVES = ("anfo", "doped_emulsion", "gassed_emulsion", "heavy_anfo")

@@ -37,8 +37,8 @@ def file(castblast, recipe):
     return out
 
 
-def test_check_finds_no_fault(castblast, file):
-    done = castblast("dataset", "check", file)
+def test_check_finds_no_fault(castblast_here, file):
+    done = castblast_here("dataset", "check", file)
     assert done.returncode == 0, done.stdout
     assert "no faults" in done.stdout
 
@@ -51,7 +51,7 @@ def test_one_worker_gives_the_same_bytes(castblast, recipe, file):
 
 
 def test_a_cluster_and_another_cut_into_shards_give_the_same_rows(
-    castblast, recipe, file, tmp_path
+    castblast, castblast_here, recipe, file, tmp_path
 ):
     """Two worker processes over TCP, five rows to a shard: rows do not know their neighbours."""
     other = tmp_path / "coarse.yaml"
@@ -67,23 +67,23 @@ def test_a_cluster_and_another_cut_into_shards_give_the_same_rows(
     finally:
         cluster.close()
     assert done.returncode == 0, done.stderr
-    done = castblast("dataset", "diff", file, tmp_path / "data.nc", "--json")
+    done = castblast_here("dataset", "diff", file, tmp_path / "data.nc", "--json")
     assert done.returncode == 0, done.stdout
     assert json.loads(done.stdout)["same"]
 
 
-def test_an_extension_keeps_old_rows_and_is_reproduced(castblast, file, tmp_path):
+def test_an_extension_keeps_old_rows_and_is_reproduced(castblast, castblast_here, file, tmp_path):
     done = castblast("dataset", "extend", file, "--add", 8, "--out", tmp_path, "--json")
     assert done.returncode == 0, done.stderr
     more = tmp_path / "data.nc"
     assert json.loads(done.stdout)["id"] == "full/1.3.0"
-    done = castblast("dataset", "diff", file, more, "--json")
+    done = castblast_here("dataset", "diff", file, more, "--json")
     assert done.returncode == 4
     found = json.loads(done.stdout)
     assert found["rows"] == {"common": SIZE, "first_only": 0, "second_only": 8}
     assert found["variables"] == {}
     for sample in (3, SIZE + 5):
-        done = castblast("dataset", "reproduce", more, "--sample", sample, "--json")
+        done = castblast_here("dataset", "reproduce", more, "--sample", sample, "--json")
         assert done.returncode == 0, done.stdout
         assert json.loads(done.stdout)["same"]
 
@@ -100,27 +100,27 @@ def test_samples_are_reproduced_from_the_file_alone(castblast, file, sample, tmp
     assert document["recomputed"]["burden_velocity"] == document["stored"]["burden_velocity"]
 
 
-def test_a_changed_number_is_not_reproduced(castblast, file, tmp_path):
+def test_a_changed_number_is_not_reproduced(castblast_here, file, tmp_path):
     import netCDF4
 
     moved = tmp_path / "moved.nc"
     moved.write_bytes(file.read_bytes())
     with netCDF4.Dataset(moved, "a") as stored:
         stored["burden_velocity"][3] *= 1.0 + 1e-6
-    assert castblast("dataset", "check", moved).returncode == 4
-    done = castblast("dataset", "reproduce", moved, "--sample", 3)
+    assert castblast_here("dataset", "check", moved).returncode == 4
+    done = castblast_here("dataset", "reproduce", moved, "--sample", 3)
     assert done.returncode == 4
     assert "differs, most in burden_velocity" in done.stdout
 
 
-def test_no_such_sample(castblast, file):
-    done = castblast("dataset", "reproduce", file, "--sample", SIZE)
+def test_no_such_sample(castblast_here, file):
+    done = castblast_here("dataset", "reproduce", file, "--sample", SIZE)
     assert done.returncode == 2
     assert f"no sample {SIZE}; ids are 0 to {SIZE - 1}" in done.stderr
 
 
-def test_describe(castblast, file):
-    done = castblast("dataset", "describe", file, "--json")
+def test_describe(castblast_here, file):
+    done = castblast_here("dataset", "describe", file, "--json")
     document = json.loads(done.stdout)
     assert document["size"] == SIZE
     assert sum(document["split"].values()) == SIZE
@@ -161,11 +161,11 @@ def test_bad_recipe_is_one_line_per_fault_and_no_file(castblast, tmp_path):
 
 
 @pytest.mark.parametrize("verb", ["check", "describe", "reproduce"])
-def test_unreadable_dataset_is_one_line(castblast, file, tmp_path, verb):
+def test_unreadable_dataset_is_one_line(castblast_here, file, tmp_path, verb):
     path = tmp_path / "data.nc"
     content = file.read_bytes()
     path.write_bytes(content[: len(content) // 2])
-    done = castblast("dataset", verb, path)
+    done = castblast_here("dataset", verb, path)
     assert done.returncode == 2
     assert len(done.stderr.strip().splitlines()) == 1
     assert "is truncated or damaged" in done.stderr

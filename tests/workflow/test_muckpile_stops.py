@@ -73,7 +73,8 @@ def contents(folder: Path) -> dict[str, bytes]:
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("undisturbed")
-    run_muckpile(written(folder), folder / "out", threads=1)
+    _, errors = (process := start(written(folder), "--out", folder / "out")).communicate()
+    assert process.returncode == 0, errors
     return folder / "out"
 
 
