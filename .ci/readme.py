@@ -1,7 +1,8 @@
 """Run the README: its installation in a fresh environment, then every command that it shows.
 
-Sizes are cut so that all of it takes a few minutes; everything else is run as it stands. The
-environment and all results lie in a folder of their own, so nothing is left behind.
+Sizes are cut so that all of it takes a few minutes; everything else is run as it stands. Results
+lie in a folder of their own, so nothing is left behind. So does the environment, unless an argument
+names a folder for it, which must not be there yet: continuous integration goes on with it.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -53,33 +55,45 @@ def smaller(command: str) -> str:
     return command + "".join(more for text, more in ADDED.items() if command.startswith(text))
 
 
-def run(command: str, folder: Path) -> None:
-    """Run one command and stop at the first that fails."""
-    began = time.perf_counter()
-    path = f"{folder / '.venv' / 'bin'}{os.pathsep}{os.environ['PATH']}"
-    done = subprocess.run(
-        command,
-        shell=True,
-        cwd=folder,
-        env={**os.environ, "PATH": path, "PIP_NO_COMPILE": "1"},
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        check=False,
-    )
-    print(f"{time.perf_counter() - began:6.1f} s  {command}", flush=True)
-    if done.returncode:
-        sys.exit(f"{done.stdout[-4000:]}\nexit code {done.returncode}: {command}")
+def run(commands: list[str], folder: Path, environment: Path) -> None:
+    """Run commands of the README one after the other and stop at the first that fails."""
+    path = f"{environment / 'bin'}{os.pathsep}{os.environ['PATH']}"
+    # Bytecode is made of what is imported, once, not of every file of every library.
+    settings = {"PATH": path, "PIP_NO_COMPILE": "0", "PYTHONDONTWRITEBYTECODE": ""}
+    for command in commands:
+        began = time.perf_counter()
+        done = subprocess.run(
+            command.replace(".venv", str(environment)),
+            shell=True,
+            cwd=folder,
+            env={**os.environ, **settings},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            check=False,
+        )
+        print(f"{time.perf_counter() - began:6.1f} s  {command}", flush=True)
+        if done.returncode:
+            sys.exit(f"{done.stdout[-4000:]}\nexit code {done.returncode}: {command}")
 
 
 def main() -> None:
-    """Install and run."""
+    """Install, then run what needs the muckpile beside the chain from dataset to export."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        for command in (*blocks("Two commands"), *blocks("What you can do")):
-            if wanted := smaller(command):
-                run(wanted, folder)
+        environment = Path(*sys.argv[1:2] or [folder / ".venv"]).absolute()
+        if environment.exists():
+            sys.exit(f"{environment} is there already; the README's is to be a new one")
+        install, verbs = (
+            [wanted for command in blocks(heading) if (wanted := smaller(command))]
+            for heading in ("Two commands", "What you can do")
+        )
+        run(install, folder, environment)
+        lanes = [[verb for verb in verbs if ("muckpile" in verb) is pile] for pile in (True, False)]
+        with ThreadPoolExecutor() as pool:
+            for lane in [pool.submit(run, lane, folder, environment) for lane in lanes]:
+                lane.result()
 
 
 if __name__ == "__main__":
