@@ -30,7 +30,7 @@ SLOW: dict[str, Any] = {
     "bench": {"length": "4 m", "width": "4 m", "height": "3 m", "burden": "2 m", "spacing": "2 m"},
     "velocity": "6 m/s",
     "balls": {"count": 200},
-    "stop": {"longest_time": "0.6 s"},
+    "stop": {"longest_time": "0.4 s"},
     "numerics": {"time_step": "1e-5 s"},
 }
 
@@ -112,7 +112,7 @@ def test_a_cast_that_is_stopped_goes_on(
 
 
 def test_a_packing_that_is_stopped_goes_on(tmp_path: Path) -> None:
-    quick = {"balls": {"count": 1500}, "numerics": {}, "stop": {"longest_time": "0.02 s"}}
+    quick = {"balls": {"count": 900}, "numerics": {}, "stop": {"longest_time": "0.02 s"}}
     bench, out = written(tmp_path, **quick), tmp_path / "out"
     process = start(bench, "--out", out)
     wait_for(process, lambda line: "packing" in line)
