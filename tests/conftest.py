@@ -89,7 +89,7 @@ def _coarse_pictures() -> Iterator[None]:
         return
     from matplotlib.figure import Figure
 
-    from castblast.report.ball_picture import Canvas
+    from castblast.report.piles.ball_picture import Canvas
 
     save, paint = Figure.savefig, Canvas.__init__
 

@@ -20,7 +20,7 @@ from collections.abc import Mapping
 from math import exp, nan, sqrt
 from typing import Any, NamedTuple
 
-from castblast.variables import VARIABLES
+from castblast.design.variables import VARIABLES
 
 #: Share of blasts that the prediction band is meant to hold: from the 5th to the 95th percentile.
 COVERAGE = 0.90
@@ -113,7 +113,7 @@ def prediction_factor(name: str, network_band: float = 0.0) -> float:
     Parameters
     ----------
     name : str
-        Of `castblast.variables`.
+        Of `castblast.design.variables`.
     network_band : float
         Relative half-width of the 95 % band of the network that gave the value; 0 for physics.
 

@@ -62,7 +62,11 @@ def _prepare_cache() -> str | None:
 def is_compiled(package: str) -> bool:
     """Say whether compiled kernels of a subpackage, such as ``nearfield``, lie in the cache."""
     folder = _prepare_cache()
-    return folder is not None and any(Path(folder).glob(f"{package}*/*.nbi"))
+    if folder is None:
+        return False
+    # Numba names a folder of its cache by the folder of the source.
+    rooms = [package, *(path.name for path in (_PACKAGE / package).iterdir() if path.is_dir())]
+    return any(any(Path(folder).glob(f"{room}_*/*.nbi")) for room in rooms)
 
 
 def kernel(function: Callable[_P, _R]) -> Callable[_P, _R]:

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from castblast.dataset.store import reading_dataset
-from castblast.specs.model import read_model_spec
-from castblast.surrogate.conformal import band_coverage, conformal_band, expected_coverage
-from castblast.surrogate.features import read_table
-from castblast.surrogate.training import fit_spec
+from castblast.dataset.file.store import reading_dataset
+from castblast.specs.models.model import read_model_spec
+from castblast.surrogate.fitting.conformal import band_coverage, conformal_band, expected_coverage
+from castblast.surrogate.fitting.features import read_table
+from castblast.surrogate.fitting.training import fit_spec
 
 REDRAWS = 500
 

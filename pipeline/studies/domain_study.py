@@ -17,15 +17,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.dataset.store import reading_dataset
+from castblast.dataset.file.store import reading_dataset
 from castblast.network import Floats, Network, density_score, in_domain, scale_columns
-from castblast.specs.model import PAPER_TARGETS, RidgeSpec
+from castblast.specs.models.model import PAPER_TARGETS, RidgeSpec
 from castblast.specs.recipe import Recipe, recipe_from_text
-from castblast.stages.infill import shares_of
-from castblast.surrogate.conformal import band_coverage
-from castblast.surrogate.density import LEVEL, fit_density
-from castblast.surrogate.features import Table, read_table
-from castblast.surrogate.training import fit_spec
+from castblast.stages.datasets.infill import shares_of
+from castblast.surrogate.fitting.conformal import band_coverage
+from castblast.surrogate.fitting.density import LEVEL, fit_density
+from castblast.surrogate.fitting.features import Table, read_table
+from castblast.surrogate.fitting.training import fit_spec
 
 COPIES = 20
 TERMS = (1, 2, 4, 8, 16)
@@ -132,7 +132,7 @@ def main() -> None:
 
 def logarithmic(network: Network, table: Table, names: list[str]) -> Network:
     """Give the record log inputs where it can have them, and the density in those."""
-    from castblast.surrogate.density import with_density
+    from castblast.surrogate.fitting.density import with_density
 
     train = table.frame.iloc[table.rows("train")]
     columns = tuple(

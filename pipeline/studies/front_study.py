@@ -15,8 +15,8 @@ from pathlib import Path
 from mesh_study import PAGE, Change, Setting, keep, put, run_all, table
 from study_cases import draw_cases
 
-from castblast.blast import BlastCase
-from castblast.files import write_text
+from castblast.blast.run import BlastCase
+from castblast.disk.files import write_text
 from castblast.nearfield.march import Annulus
 from castblast.nearfield.setup import EQUILIBRIUM_REACH, EQUILIBRIUM_ZONES, FRONT_ZONES
 

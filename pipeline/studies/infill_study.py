@@ -23,15 +23,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.dataset.design import Design, extend_design
-from castblast.dataset.extend import read_existing
-from castblast.dataset.simulation import BlastSimulator, blast_simulator
+from castblast.dataset.building.extend import read_existing
+from castblast.dataset.rows.design import Design, extend_design
+from castblast.dataset.rows.simulation import BlastSimulator, blast_simulator
 from castblast.errors import Status
 from castblast.network import Floats, Layer, run_layers
 from castblast.specs.recipe import Recipe
-from castblast.surrogate.conformal import conformal_band
-from castblast.surrogate.infill import POOL_FACTOR, choose_batch, infill_worth
-from castblast.surrogate.levenberg import fit_dense
+from castblast.surrogate.fitting.conformal import conformal_band
+from castblast.surrogate.fitting.families.levenberg import fit_dense
+from castblast.surrogate.searching.infill import POOL_FACTOR, choose_batch, infill_worth
 
 #: One target of the near field and the one of the burden motion.
 TARGETS = ("crushed_zone_radius", "burden_velocity")

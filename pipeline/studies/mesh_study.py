@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 from study_cases import ROOT, draw_cases
 
-from castblast.blast import BlastCase
+from castblast.blast.run import BlastCase
+from castblast.disk.files import write_text
 from castblast.errors import Status
 from castblast.explosive.isentrope import pressure
-from castblast.files import write_text
 from castblast.nearfield.case import NearFieldSettings
 from castblast.nearfield.march import Annulus, March, march
 from castblast.nearfield.outcome import STATE_NAMES, WINDOW, end_state, mean_over

@@ -28,16 +28,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.files import write_text
-from castblast.muckpile.bench import Bench, block_shape, block_velocities, row_delays
-from castblast.muckpile.contact import ContactLaw
-from castblast.muckpile.metrics import pile_metrics
-from castblast.muckpile.packing import fill_bench, mean_radius_for_count
-from castblast.muckpile.particles import Particles, centre_of_mass, particles_at_rest
-from castblast.muckpile.profile import mean_profile, surface_height
-from castblast.muckpile.solver import CastCase, CastResult, run_cast
-from castblast.muckpile.state import PRECISIONS
-from castblast.muckpile.walls import bench_walls
+from castblast.disk.files import write_text
+from castblast.muckpile.balls.contact import ContactLaw
+from castblast.muckpile.balls.particles import Particles, centre_of_mass, particles_at_rest
+from castblast.muckpile.balls.state import PRECISIONS
+from castblast.muckpile.bench.geometry import Bench, block_shape, block_velocities, row_delays
+from castblast.muckpile.bench.packing import fill_bench, mean_radius_for_count
+from castblast.muckpile.bench.surroundings import bench_walls
+from castblast.muckpile.cast.solver import CastCase, CastResult, run_cast
+from castblast.muckpile.results.metrics import pile_metrics
+from castblast.muckpile.results.profile import mean_profile, surface_height
 
 BENCH = Bench(length=6.0, width=9.0, height=6.0, burden=3.0, spacing=3.0)
 SPEED = 12.7

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm, qmc
 
-from castblast.blast import batch_values, run_blasts
+from castblast.blast.run import batch_values, run_blasts
+from castblast.design.variables import VARIABLES
 from castblast.errors import Status
 from castblast.specs.explosive import load_explosive
-from castblast.variables import VARIABLES
 
 TARGETS = (
     "equilibrium_pressure", "expanded_hole_radius", "crushed_zone_radius", "plastic_zone_radius",

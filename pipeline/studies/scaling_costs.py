@@ -30,9 +30,9 @@ from scaling_runs import (
     timed,
 )
 
-from castblast.dataset.design import Design
-from castblast.dataset.shards import ShardTask, Span, write_shard
-from castblast.dataset.simulation import BatchResult, FloatArray
+from castblast.dataset.building.shards import ShardTask, Span, write_shard
+from castblast.dataset.rows.design import Design
+from castblast.dataset.rows.simulation import BatchResult, FloatArray
 
 #: Rows of the shards of physics that are compared: the difference is what a shard costs by itself.
 _SHORT_SHARD = 256

@@ -22,7 +22,7 @@ from scaling_costs import Measured, measure
 from scaling_law import Build, Means, Plan, Prediction, plan, predict
 from scaling_runs import Order, Timed, cluster, timed
 
-from castblast.files import write_text
+from castblast.disk.files import write_text
 from castblast.report.style import CYCLE, GREY, in_style, new_figure, save_figure
 
 PAGE = Path(__file__).resolve().parent.parent / "docs/scaling.md"

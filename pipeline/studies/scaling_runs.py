@@ -22,15 +22,15 @@ from typing import NamedTuple
 import numpy as np
 import psutil  # type: ignore[import-untyped]
 
-from castblast.dataset.design import Design, make_design
-from castblast.dataset.meter import peak_memory
-from castblast.dataset.provenance import ExplosiveSource, load_explosives
-from castblast.dataset.shards import Span, read_shard, write_shard
-from castblast.dataset.simulation import BatchResult, BlastSimulator, Columns, blast_simulator
-from castblast.inputs import IntArray
+from castblast.blast.inputs import IntArray
+from castblast.dataset.building.process import peak_memory
+from castblast.dataset.building.shards import Span, read_shard, write_shard
+from castblast.dataset.file.provenance import ExplosiveSource, load_explosives
+from castblast.dataset.rows.design import Design, make_design
+from castblast.dataset.rows.simulation import BatchResult, BlastSimulator, Columns, blast_simulator
+from castblast.design.variables import OUTPUT_NAMES
 from castblast.specs.recipe import RecipeSource, load_recipe
-from castblast.stages.generate import produce
-from castblast.variables import OUTPUT_NAMES
+from castblast.stages.datasets.generate import produce
 
 STUDIES = Path(__file__).resolve().parent
 RECIPE = STUDIES.parent.parent / "data_specs/recipes/full.yaml"

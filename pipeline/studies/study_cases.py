@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from castblast.blast import BlastCase, BlastSettings, make_case
-from castblast.dataset.design import make_design
-from castblast.dataset.provenance import load_explosives
-from castblast.dataset.simulation import blast_simulator
+from castblast.blast.run import BlastCase, BlastSettings, make_case
+from castblast.dataset.file.provenance import load_explosives
+from castblast.dataset.rows.design import make_design
+from castblast.dataset.rows.simulation import blast_simulator
 from castblast.nearfield.front import front_number
-from castblast.nearfield.mohr_coulomb import friction_number
+from castblast.nearfield.rock.mohr_coulomb import friction_number
 from castblast.specs.recipe import load_recipe
 
 ROOT = Path(__file__).resolve().parent.parent.parent

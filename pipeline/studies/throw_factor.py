@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from castblast.muckpile.ballistic import block_throw
-from castblast.stages.muckpile import run_muckpile
+from castblast.muckpile.results.ballistic import block_throw
+from castblast.stages.muckpile.run import run_muckpile
 
 HEIGHTS = (8.0, 12.5, 24.0)
 SPEEDS = (6.0, 12.0, 18.0)

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from castblast.dataset.provenance import load_explosives
-from castblast.dataset.simulation import blast_simulator
+from castblast.dataset.file.provenance import load_explosives
+from castblast.dataset.rows.simulation import blast_simulator
 from castblast.specs.recipe import load_recipe
-from castblast.surrogate.domain import Domain
-from castblast.surrogate.probe import Pairs, physics_probe
+from castblast.surrogate.judging.domain import Domain
+from castblast.surrogate.judging.probe import Pairs, physics_probe
 
 RECIPES = Path(__file__).resolve().parents[2] / "data_specs" / "recipes"
 

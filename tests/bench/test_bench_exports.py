@@ -15,18 +15,13 @@ import numpy as np
 import pytest
 from sklearn.neural_network import MLPRegressor
 
-from castblast.export.runners import (
-    RUN_ROWS,
-    compile_c,
-    run_program,
-    written,
-)
+from castblast.export.source.runners import RUN_ROWS, compile_c, run_program, written
 from castblast.export.targets import TARGETS
 from castblast.network import explosive_index, predict_rows
-from castblast.specs.model import PAPER_FEATURES, PAPER_TARGETS, MlpSpec
-from castblast.surrogate import estimators
-from castblast.surrogate.features import read_table
-from castblast.surrogate.training import fit_spec
+from castblast.specs.models.model import PAPER_FEATURES, PAPER_TARGETS, MlpSpec
+from castblast.surrogate.fitting import estimators
+from castblast.surrogate.fitting.features import read_table
+from castblast.surrogate.fitting.training import fit_spec
 
 SPEC = MlpSpec(
     name="wide",

@@ -10,12 +10,12 @@ import time
 import pytest
 
 import castblast.burden.batch
-import castblast.nearfield.batch
-from castblast.dataset.design import make_design
-from castblast.dataset.provenance import load_explosives
-from castblast.dataset.simulation import blast_simulator
+import castblast.nearfield.lockstep.batch
+from castblast.dataset.file.provenance import load_explosives
+from castblast.dataset.rows.design import make_design
+from castblast.dataset.rows.simulation import blast_simulator
 from castblast.specs.recipe import load_recipe
-from castblast.stages.generate import generate
+from castblast.stages.datasets.generate import generate
 
 ROWS = 4000
 DESIGN_ROWS = 100_000
@@ -60,7 +60,7 @@ def in_kernels(monkeypatch):
     """Processor seconds of the kernels, call by call."""
     seconds = []
     for module, name in (
-        (castblast.nearfield.batch, "march_many"),
+        (castblast.nearfield.lockstep.batch, "march_many"),
         (castblast.burden.batch, "_solve_rows"),
     ):
         monkeypatch.setattr(module, name, timed(getattr(module, name), seconds))

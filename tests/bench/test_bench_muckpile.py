@@ -18,15 +18,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from castblast.export.deck import read_loop_times
-from castblast.export.lammps_deck import write_lammps_deck
-from castblast.export.liggghts_deck import write_liggghts_deck
-from castblast.muckpile.bench import Bench
-from castblast.muckpile.case import CastCase
-from castblast.muckpile.contact import ContactLaw
-from castblast.muckpile.packing import fill_bench
-from castblast.muckpile.particles import particles_at_rest
-from castblast.muckpile.walls import bench_walls
+from castblast.export.engines.deck import read_loop_times
+from castblast.export.engines.lammps_deck import write_lammps_deck
+from castblast.export.engines.liggghts_deck import write_liggghts_deck
+from castblast.muckpile.balls.contact import ContactLaw
+from castblast.muckpile.balls.particles import particles_at_rest
+from castblast.muckpile.bench.geometry import Bench
+from castblast.muckpile.bench.packing import fill_bench
+from castblast.muckpile.bench.surroundings import bench_walls
+from castblast.muckpile.cast.case import CastCase
 
 BALLS = int(os.environ.get("CASTBLAST_BENCH_BALLS", "400000"))
 STEP, WARM_UP, STEPS = 3e-4, 40, 200
@@ -41,13 +41,13 @@ PEERS = {
 RUN = """
 import json, sys, time
 import numpy as np
-from castblast.dataset.meter import peak_memory
-from castblast.muckpile.bench import Bench
-from castblast.muckpile.contact import ContactLaw
-from castblast.muckpile.particles import particles_at_rest
-from castblast.muckpile.simulation import Simulation
-from castblast.muckpile.threads import thread_count
-from castblast.muckpile.walls import bench_walls
+from castblast.dataset.building.process import peak_memory
+from castblast.muckpile.bench.geometry import Bench
+from castblast.muckpile.balls.contact import ContactLaw
+from castblast.muckpile.balls.particles import particles_at_rest
+from castblast.muckpile.engine.simulation import Simulation
+from castblast.muckpile.engine.threads import thread_count
+from castblast.muckpile.bench.surroundings import bench_walls
 file, precision, threads, length, step, warm_up, steps = sys.argv[1:]
 step, warm_up, steps = float(step), int(warm_up), int(steps)
 with np.load(file) as stored:

@@ -9,14 +9,14 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from castblast.blast import BlastSettings, make_case
+from castblast.blast.run import BlastSettings, make_case
 from castblast.burden.batch import solve_burden_motions
 from castblast.burden.case import BurdenColumns, BurdenGeometry, BurdenParameters
-from castblast.dataset.design import make_design
-from castblast.dataset.provenance import load_explosives
-from castblast.dataset.simulation import blast_simulator
-from castblast.nearfield.batch import solve_near_fields
+from castblast.dataset.file.provenance import load_explosives
+from castblast.dataset.rows.design import make_design
+from castblast.dataset.rows.simulation import blast_simulator
 from castblast.nearfield.case import Hole, NearFieldColumns, NearFieldSettings, Rock
+from castblast.nearfield.lockstep.batch import solve_near_fields
 from castblast.nearfield.solver import solve_near_field
 from castblast.specs.recipe import load_recipe
 

@@ -5,7 +5,7 @@ import pytest
 from sklearn.neural_network import MLPRegressor
 
 from castblast.network import evaluate
-from castblast.stages.predict import complete_inputs, load_network
+from castblast.prediction.answer import complete_inputs, load_network
 
 NETWORK = load_network()
 DESIGN = complete_inputs({}, NETWORK)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from castblast.variables import INPUTS, OUTPUTS, VARIABLES, Variable
+from castblast.design.variables import INPUTS, OUTPUTS, VARIABLES, Variable
 
 HEAVY = ("torch", "mlflow", "dask", "distributed", "sklearn", "xarray", "scipy", "numba", "pandas")
 

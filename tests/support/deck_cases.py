@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from castblast.muckpile.case import CastCase
-from castblast.muckpile.contact import ContactLaw
-from castblast.muckpile.particles import particles_at_rest
-from castblast.muckpile.walls import floor, join, plane, slope
+from castblast.muckpile.balls.contact import ContactLaw
+from castblast.muckpile.balls.particles import particles_at_rest
+from castblast.muckpile.cast.case import CastCase
+from castblast.muckpile.ground.walls import floor, join, plane, slope
 
 
 def two_blocks(law: ContactLaw, delay, velocity) -> CastCase:

@@ -12,14 +12,14 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from castblast.dataset.design import make_design
-from castblast.dataset.provenance import load_explosives
-from castblast.dataset.schema import HISTORIES, plausible_range
-from castblast.dataset.simulation import BatchResult, BlastSimulator, blast_simulator
+from castblast.dataset.file.provenance import load_explosives
+from castblast.dataset.file.schema import HISTORIES, plausible_range
+from castblast.dataset.rows.design import make_design
+from castblast.dataset.rows.simulation import BatchResult, BlastSimulator, blast_simulator
+from castblast.design.variables import OUTPUT_NAMES
 from castblast.errors import Status
 from castblast.specs.recipe import load_recipe
-from castblast.stages.generate import GenerateOutcome, produce
-from castblast.variables import OUTPUT_NAMES
+from castblast.stages.datasets.generate import GenerateOutcome, produce
 
 RECIPE = {
     "name": "small",

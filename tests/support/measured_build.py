@@ -12,7 +12,7 @@ from pathlib import Path
 import yaml
 from fake_blast import fake_generate, fake_simulator
 
-from castblast.dataset.meter import peak_memory
+from castblast.dataset.building.process import peak_memory
 
 
 def main(recipe, folder, rows, shard_size, seconds, workers):

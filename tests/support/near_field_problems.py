@@ -4,9 +4,9 @@ import numpy as np
 
 from castblast.explosive.isentrope import Explosive, jwl_isentrope
 from castblast.nearfield.case import Hole, NearFieldSettings, Rock
-from castblast.nearfield.lagrangian import Material
 from castblast.nearfield.march import Annulus, WallLoad
-from castblast.nearfield.mohr_coulomb import apex_tension, friction_number
+from castblast.nearfield.rock.lagrangian import Material
+from castblast.nearfield.rock.mohr_coulomb import apex_tension, friction_number
 from castblast.nearfield.solver import NearFieldResult, solve_near_field
 
 

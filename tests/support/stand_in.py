@@ -114,10 +114,10 @@ def wait_for(condition, seconds=_START_SECONDS):
 
 
 def main(seconds, arguments):
-    import castblast.stages.extend
-    import castblast.stages.generate
+    import castblast.stages.datasets.extend
+    import castblast.stages.datasets.generate
     from castblast.cli import main as run
-    from castblast.dataset.simulation import blast_simulator
+    from castblast.dataset.rows.simulation import blast_simulator
 
     def stand_in(recipe, explosives):
         real = blast_simulator(recipe, explosives)
@@ -125,8 +125,8 @@ def main(seconds, arguments):
         # as workers import it, not as the script that this is
         return import_module("stand_in").SlowBlast(**values, seconds=seconds)
 
-    castblast.stages.generate.blast_simulator = stand_in
-    castblast.stages.extend.blast_simulator = stand_in
+    castblast.stages.datasets.generate.blast_simulator = stand_in
+    castblast.stages.datasets.extend.blast_simulator = stand_in
     return run(arguments)
 
 

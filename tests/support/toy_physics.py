@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from castblast.dataset.simulation import BatchResult, BlastSimulator, blast_simulator
+from castblast.dataset.rows.simulation import BatchResult, BlastSimulator, blast_simulator
+from castblast.design.variables import OUTPUT_NAMES
 from castblast.specs.explosive import load_explosive
 from castblast.specs.loading import make_spec
 from castblast.specs.recipe import Recipe
-from castblast.surrogate.domain import Domain
-from castblast.variables import OUTPUT_NAMES
+from castblast.surrogate.judging.domain import Domain
 
 EXPLOSIVES = ("anfo", "doped_emulsion")
 FEATURES = ("ucs", "young_modulus", "hole_diameter", "bench_height", "burden", "charge_length")

@@ -19,9 +19,10 @@ from castblast.bands import (
     show_band,
     show_value,
 )
-from castblast.stages.predict import predict, predict_design
+from castblast.design.variables import OUTPUT_NAMES, VARIABLES
+from castblast.prediction.answer import predict
+from castblast.stages.predict import predict_design
 from castblast.stages.simulate import simulate
-from castblast.variables import OUTPUT_NAMES, VARIABLES
 
 #: ANFO in a hole of 102 mm, burden 3 m, bench of 12.5 m: what both parameter sets give.
 DESIGN = {"hole_diameter": 0.102, "burden": 3.0}

@@ -8,10 +8,10 @@ import pytest
 from castblast.cli.screen import Screen
 from castblast.errors import CastblastError
 from castblast.names import cell_text, check_label, check_name, is_label, printable, shortened
-from castblast.specs.bench import BenchSpec
+from castblast.specs.bench.bench import BenchSpec
 from castblast.specs.explosive import load_explosive
 from castblast.specs.loading import make_spec, read_yaml
-from castblast.specs.model import read_model_spec
+from castblast.specs.models.model import read_model_spec
 from castblast.specs.recipe import load_recipe
 
 #: Path traversal, absolute paths, markup of the terminal and of pictures, formulas, code, escapes.

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from castblast.progress import silent
-from castblast.stages.demo import STEPS, make_demo, summarise
+from castblast.stages.demo.run import STEPS, make_demo, summarise
 
 RECIPE = """
 name: tiny

@@ -40,12 +40,23 @@ def test_every_model_spec_is_a_stage(repository: Path, stages: dict) -> None:
 
 def test_every_source_of_a_fit_is_a_dependency(repository: Path, stages: dict) -> None:
     """What makes a kept fit stale makes its stage stale; else a comparison would refit unseen."""
-    from castblast.surrogate.fit_store import fit_sources
+    from castblast.surrogate.fitting.fit_store import FIT_SOURCES
 
-    deps = [repository / path for path in _paths(stages["train@ridge"], "deps")]
-    for source in fit_sources():
-        if source.name != "__init__.py":
-            assert any(dep == source or dep in source.parents for dep in deps), source
+    deps = _paths(stages["train@ridge"], "deps")
+    for source in FIT_SOURCES:
+        assert (repository / "pipeline" / "castblast" / source).is_dir()
+        assert f"pipeline/castblast/{source}" in deps
+
+
+def test_every_source_of_a_row_is_a_dependency(repository: Path, stages: dict) -> None:
+    """What makes a dataset stale makes the stage that builds it stale."""
+    from castblast.dataset.file.provenance import SOURCES
+
+    deps = _paths(stages["generate"], "deps")
+    for source in SOURCES:
+        path = f"pipeline/castblast/{source}"
+        assert (repository / path).exists()
+        assert path in deps or str(Path(path).parent) in deps, source
 
 
 def test_dvc_reads_it(repository: Path) -> None:

@@ -45,7 +45,8 @@ class BurdenGeometry(NamedTuple):
 class BurdenParameters(NamedTuple):
     """Parameters of the burden-motion model: calibrated, not validated.
 
-    Names and meaning are those of `castblast.variables` with the role ``burden_model``; units SI.
+    Names and meaning are those of `castblast.design.variables` with the role ``burden_model``;
+    units SI.
 
     Attributes
     ----------

@@ -2,7 +2,7 @@
 
 import typer
 
-from castblast.cli import (
+from castblast.cli.verbs import (
     datasets,
     demo,
     explosive,

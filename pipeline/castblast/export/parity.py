@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.export.answers import Answers, NotVerifiedError
-from castblast.export.onnx_file import run_onnx_rows
-from castblast.export.plain import Files
+from castblast.export.onnx.file import run_onnx_rows
+from castblast.export.source.answers import Answers, NotVerifiedError
+from castblast.export.source.plain import Files
 from castblast.export.targets import TARGETS
 from castblast.network import (
     Bounds,

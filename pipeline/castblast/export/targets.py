@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from castblast.export.bench_runners import run_lammps, run_pfc
-from castblast.export.bench_scripts import to_lammps, to_pfc
-from castblast.export.c_source import to_c
-from castblast.export.javascript import to_javascript
-from castblast.export.json_file import to_json
-from castblast.export.onnx_file import to_onnx
-from castblast.export.plain import Files
-from castblast.export.python_source import to_python
-from castblast.export.runners import Runner, run_c, run_js, run_json, run_onnx, run_python
+from castblast.export.engines.bench_runners import run_lammps, run_pfc
+from castblast.export.engines.bench_scripts import to_lammps, to_pfc
+from castblast.export.onnx.file import to_onnx
+from castblast.export.sheet.runner import run_excel
+from castblast.export.sheet.workbook import to_excel
+from castblast.export.source.c import to_c
+from castblast.export.source.javascript import to_javascript
+from castblast.export.source.plain import Files
+from castblast.export.source.python import to_python
+from castblast.export.source.runners import Runner, run_c, run_js, run_json, run_onnx, run_python
 from castblast.export.web import run_web, to_web
-from castblast.export.workbook import to_excel
-from castblast.export.workbook_runner import run_excel
 from castblast.network import Network
+from castblast.network.json_file import to_json
 
 
 class Target(NamedTuple):

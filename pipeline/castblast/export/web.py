@@ -14,14 +14,14 @@ from pathlib import Path
 from typing import Any
 
 from castblast.bands import THROW_FACTOR, THROW_SD, prediction_factor, throw_band_factor
-from castblast.design import COMPLETED, rules_as_data
+from castblast.design.rule import COMPLETED, rules_as_data
+from castblast.design.variables import VARIABLES
 from castblast.errors import SpecError
-from castblast.export.answers import Answers
-from castblast.export.javascript import to_javascript
-from castblast.export.plain import Files, compact, render
-from castblast.export.runners import Index, run_js
+from castblast.export.source.answers import Answers
+from castblast.export.source.javascript import to_javascript
+from castblast.export.source.plain import Files, compact, render
+from castblast.export.source.runners import Index, run_js
 from castblast.network import Floats, Network
-from castblast.variables import VARIABLES
 
 PAGE = "index.html"
 _FOLDER = Path(__file__).parent / "templates" / "web"
@@ -113,7 +113,7 @@ def _facts(network: Network, histories: Mapping[str, Any] | None) -> dict[str, A
 def _table_facts(network: Network) -> dict[str, Any]:
     """What tables of designs may say: heads of ids, units to SI, names of explosives."""
     from castblast.specs.catalogue import explosive_aliases, spelled
-    from castblast.specs.table import ID_HEADS
+    from castblast.specs.tables.table import ID_HEADS
     from castblast.specs.units import unit_factor
 
     names = {spelled(name): name for name in network.explosives}

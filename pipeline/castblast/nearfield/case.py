@@ -85,7 +85,7 @@ class NearFieldSettings(NamedTuple):
     zones : int
         0: the default of the mode, in equilibrium mode more in rock that yields in the wave front.
     quadratic_viscosity, linear_viscosity : float [-]
-        See `castblast.nearfield.lagrangian`; below a linear viscosity of 0.1 weak rock of high
+        See `castblast.nearfield.rock.lagrangian`; below a linear viscosity of 0.1 weak rock of high
         friction has no answer that converges. Rock that yields in the wave front has none of the
         linear one, whatever is set: see `castblast.nearfield.front`.
     history_points : int

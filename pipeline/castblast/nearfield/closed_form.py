@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from castblast.nearfield.lagrangian import FloatArray
-from castblast.nearfield.mohr_coulomb import friction_number
+from castblast.nearfield.rock.lagrangian import FloatArray
+from castblast.nearfield.rock.mohr_coulomb import friction_number
 
 
 def lame_displacement(

@@ -27,7 +27,7 @@ from castblast.nearfield.clock import (
     load_work,
     start_clock,
 )
-from castblast.nearfield.lagrangian import (
+from castblast.nearfield.rock.lagrangian import (
     BOUNDARY,
     LEDGER_SIZE,
     LOAD,
@@ -39,7 +39,7 @@ from castblast.nearfield.lagrangian import (
     make_body,
     update_zones,
 )
-from castblast.nearfield.mohr_coulomb import YieldModel, make_yield_model
+from castblast.nearfield.rock.mohr_coulomb import YieldModel, make_yield_model
 
 OK = int(Status.OK)
 NOT_CONVERGED = int(Status.NOT_CONVERGED)

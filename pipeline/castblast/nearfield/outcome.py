@@ -12,7 +12,8 @@ import numpy as np
 from castblast.errors import Status
 from castblast.explosive.isentrope import energy, pressure
 from castblast.kernel import kernel
-from castblast.nearfield.lagrangian import (
+from castblast.nearfield.march import Annulus, March
+from castblast.nearfield.rock.lagrangian import (
     BOUNDARY,
     LOAD,
     RAMP,
@@ -24,7 +25,6 @@ from castblast.nearfield.lagrangian import (
     elastic_energy,
     kinetic_energy,
 )
-from castblast.nearfield.march import Annulus, March
 
 _OK = int(Status.OK)
 _RETURN_MAP_FAILED = int(Status.RETURN_MAP_FAILED)

@@ -23,10 +23,10 @@ from castblast.nearfield.case import (
     TensionMode,
 )
 from castblast.nearfield.front import front_number, regularised_share
-from castblast.nearfield.lagrangian import Material
 from castblast.nearfield.march import Annulus, WallLoad
-from castblast.nearfield.mohr_coulomb import apex_tension, friction_number
 from castblast.nearfield.outcome import WINDOW
+from castblast.nearfield.rock.lagrangian import Material
+from castblast.nearfield.rock.mohr_coulomb import apex_tension, friction_number
 
 #: Outer radius of the published model [m].
 PAPER_RADIUS = 5.5

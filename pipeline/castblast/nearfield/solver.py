@@ -1,7 +1,7 @@
 """Near field of one blasthole: from explosive, rock and hole to the equilibrium state.
 
 `solve_near_field` is a thin driver over one kernel that holds no interpreter lock; it never
-raises, a fault is a status. Many holes at once: `castblast.nearfield.batch`.
+raises, a fault is a status. Many holes at once: `castblast.nearfield.lockstep.batch`.
 
 **End of the run.** `paper` mode stops at 0.9 of the travel time of the p-wave to an outer
 boundary at 5.5 m, wherever the wall then is: with large holes or weak rock it still moves, the
@@ -34,9 +34,9 @@ import numpy as np
 from castblast.errors import Status
 from castblast.explosive.isentrope import Explosive, ProductIsentrope
 from castblast.nearfield.case import Hole, NearFieldColumns, NearFieldSettings, Rock
-from castblast.nearfield.lagrangian import FloatArray
 from castblast.nearfield.march import Annulus, march
 from castblast.nearfield.outcome import STATE_NAMES, end_state, histories, no_state
+from castblast.nearfield.rock.lagrangian import FloatArray
 from castblast.nearfield.setup import (
     common_parameters,
     hole_parameters,

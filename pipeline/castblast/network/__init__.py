@@ -32,7 +32,7 @@ from castblast.network.evaluate import (
     run_layers,
     scaled_inputs,
 )
-from castblast.network.record import (
+from castblast.network.parts import (
     Column,
     Constraint,
     DensityScore,
@@ -40,10 +40,9 @@ from castblast.network.record import (
     GoldenRows,
     InputColumn,
     Layer,
-    Network,
     OutputColumn,
-    Shell,
 )
+from castblast.network.record import Network, Shell
 from castblast.network.terms import SCHEMA_VERSION, Activation, Floats, Transform
 
 __all__ = [

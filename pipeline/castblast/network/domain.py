@@ -8,7 +8,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.network.record import Column, Shell
+from castblast.network.parts import Column
+from castblast.network.record import Shell
 from castblast.network.terms import Floats
 
 #: What refuses a row: range of one input, rule between inputs, joint density; or an input that the

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from castblast.bands import prediction_factor
 from castblast.errors import SpecError, nearest_name
 from castblast.network.domain import density_score, in_domain, scale_columns
-from castblast.network.record import Layer, Network, Shell
+from castblast.network.parts import Layer
+from castblast.network.record import Network, Shell
 from castblast.network.terms import Floats
 
 

@@ -3,30 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, get_args
+from typing import get_args
 
 import numpy as np
 
 from castblast.network.kinds import kind_faults
+from castblast.network.parts import Column, DensityScore, Layer, ShellParts
 from castblast.network.terms import SCHEMA_VERSION, Activation, Transform
 
-if TYPE_CHECKING:
-    from castblast.network.record import Column, DensityScore, Layer, Network, Shell
 
+def network_faults(
+    shell: ShellParts,
+    layers: Sequence[Layer],
+    members: Sequence[Sequence[Layer]],
+    schema_version: int,
+) -> list[str]:
+    """Say what is wrong with a network, one line each; empty if nothing is.
 
-def network_faults(network: Network) -> list[str]:
-    """Say what is wrong with a network, one line each; empty if nothing is."""
+    Parameters
+    ----------
+    shell : ShellParts
+    layers, members, schema_version
+        As in `castblast.network.record.Network`.
+    """
     faults = []
-    if kinds := kind_faults(network):
+    if kinds := kind_faults(shell):
         return kinds
-    if network.schema_version != SCHEMA_VERSION:
-        faults.append(f"schema version {network.schema_version}, this one reads {SCHEMA_VERSION}")
-    if not network.layers:
+    if schema_version != SCHEMA_VERSION:
+        faults.append(f"schema version {schema_version}, this one reads {SCHEMA_VERSION}")
+    if not layers:
         faults.append("needs at least one layer")
-    return faults + shell_faults(network) + _layer_faults(network)
+    return faults + shell_faults(shell) + _layer_faults(shell, layers, members)
 
 
-def shell_faults(shell: Shell) -> list[str]:
+def shell_faults(shell: ShellParts) -> list[str]:
     """Say what is wrong around the layers of a surrogate, one line each."""
     if kinds := kind_faults(shell):
         return kinds  # what else there is cannot be looked at
@@ -72,21 +82,23 @@ def _column_faults(columns: Iterable[Column]) -> list[str]:
     return faults
 
 
-def _unknown_inputs(what: str, coefficients: Mapping[str, float], shell: Shell) -> list[str]:
+def _unknown_inputs(what: str, coefficients: Mapping[str, float], shell: ShellParts) -> list[str]:
     known = shell.input_names
     return [f"{what}: no input '{name}'" for name in coefficients if name not in known]
 
 
-def _has_codes(shell: Shell) -> bool:
+def _has_codes(shell: ShellParts) -> bool:
     return shell.codes.ndim == 2 and len(shell.codes) == len(shell.explosives)
 
 
-def _layer_faults(network: Network) -> list[str]:
-    if not _has_codes(network):
+def _layer_faults(
+    shell: ShellParts, layers: Sequence[Layer], members: Sequence[Sequence[Layer]]
+) -> list[str]:
+    if not _has_codes(shell):
         return []
-    width, outputs = network.width, len(network.outputs)
-    faults = _chain_faults(network.layers, width, outputs)
-    for number, member in enumerate(network.members, 1):
+    width, outputs = shell.width, len(shell.outputs)
+    faults = _chain_faults(layers, width, outputs)
+    for number, member in enumerate(members, 1):
         faults += [f"member {number}: {line}" for line in _chain_faults(member, width, outputs)]
     return faults
 
@@ -123,7 +135,7 @@ def _density_faults(density: DensityScore, inputs: int) -> list[str]:
     return []
 
 
-def _golden_faults(shell: Shell) -> list[str]:
+def _golden_faults(shell: ShellParts) -> list[str]:
     rows, golden, faults = len(shell.golden.explosives), shell.golden, []
     if golden.inputs.shape != (rows, len(shell.inputs)) or (
         golden.outputs.shape != (rows, len(shell.outputs))

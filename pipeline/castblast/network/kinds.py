@@ -9,14 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from castblast.names import is_label, is_unit, is_variable, shortened
-
-if TYPE_CHECKING:
-    from castblast.network.record import Column, Shell
+from castblast.network.parts import Column, ShellParts
 
 #: Groups of a provenance, and those of its texts that go into the heads of exports.
 _GROUPS = ("spec", "dataset", "held_inputs", "scores")
@@ -27,7 +25,7 @@ _HEADS = (
 _LONGEST_TEXT = 20_000
 
 
-def kind_faults(shell: Shell) -> list[str]:
+def kind_faults(shell: ShellParts) -> list[str]:
     """Say which entries are of the wrong kind, or hold a text that none may, one line each."""
     faults = []
     for column in (*shell.inputs, *shell.derived, *shell.outputs):

@@ -69,7 +69,7 @@ def draw_simulation(
     path : path
         Picture to write (PNG or SVG).
     document : mapping
-        Outputs of the run in SI units, by the names of `castblast.variables`.
+        Outputs of the run in SI units, by the names of `castblast.design.variables`.
     near, burden
         Objects with the history arrays, each of shape (n,).
     """

@@ -12,8 +12,8 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatter, LogFormatterMathtext
 
-from castblast.files import write_with
-from castblast.variables import VARIABLES
+from castblast.design.variables import VARIABLES
+from castblast.disk.files import write_with
 
 #: Colours that stay apart for colour-blind readers (Okabe & Ito 2008).
 BLUE, ORANGE, GREEN, RED, PURPLE, SKY, YELLOW, GREY = (

@@ -8,12 +8,12 @@ from typing import Any, Literal
 
 from pydantic import Field
 
+from castblast.design.variables import INPUT_NAMES
+from castblast.disk.resources import find_spec
 from castblast.errors import SpecError, nearest_name
 from castblast.names import shortened
-from castblast.resources import find_spec
 from castblast.specs.loading import Spec, load_spec
 from castblast.specs.quantity import parse_variable
-from castblast.variables import INPUT_NAMES
 
 ModeName = Literal["equilibrium", "paper"]
 TensionName = Literal["ductile", "brittle", "none"]

@@ -9,9 +9,9 @@ from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
+from castblast.disk.resources import resource
 from castblast.errors import SpecError, nearest_name
 from castblast.names import shortened
-from castblast.resources import resource
 from castblast.specs.loading import read_yaml
 
 FOLDER = "data_specs/explosives"

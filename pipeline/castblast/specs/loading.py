@@ -18,10 +18,10 @@ from typing import Annotated, Any, ClassVar, TypeVar
 import yaml
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
+from castblast.disk.reading import nearest_file as nearest_file
+from castblast.disk.reading import read_text as read_text
 from castblast.errors import SpecError, nearest_name
 from castblast.names import check_label, check_name, shortened
-from castblast.reading import nearest_file as nearest_file
-from castblast.reading import read_text as read_text
 
 M = TypeVar("M", bound=BaseModel)
 

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from castblast.design.variables import VARIABLES, Variable
 from castblast.errors import SpecError, nearest_name
 from castblast.names import shortened
 from castblast.specs.units import QuantityError, convert
-from castblast.variables import VARIABLES, Variable
 
 if TYPE_CHECKING:
     from pydantic import GetCoreSchemaHandler
@@ -159,7 +159,7 @@ class VariableIn:
     Attributes
     ----------
     name : str
-        A name of `castblast.variables`; gives unit and plausibility bounds.
+        A name of `castblast.design.variables`; gives unit and plausibility bounds.
     """
 
     name: str

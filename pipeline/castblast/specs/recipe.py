@@ -1,7 +1,8 @@
 """Recipes: what a dataset is made of, from variables and their ranges to the solver settings.
 
 A recipe is the only input of a build. Every variable that is not named in it takes the default of
-`castblast.variables`; everything that can change a number of the dataset is part of its identity.
+`castblast.design.variables`; everything that can change a number of the dataset is part of its
+identity.
 """
 
 from __future__ import annotations
@@ -15,12 +16,12 @@ from typing import Annotated, Literal, NamedTuple
 import yaml
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from castblast.design.variables import INPUTS, VARIABLES, Variable
+from castblast.disk.resources import find_spec
 from castblast.errors import nearest_name
-from castblast.resources import find_spec
 from castblast.specs.case import ModeName, TensionName
 from castblast.specs.loading import Name, Spec, make_spec, parse_yaml, read_yaml_text
 from castblast.specs.quantity import QuantityIn, convert, convert_variable
-from castblast.variables import INPUTS, VARIABLES, Variable
 
 #: Variables a recipe may name; settings of the solver have their own block.
 DESIGN_NAMES = tuple(v.name for v in INPUTS if v.role != "solver")
@@ -40,7 +41,7 @@ class VariableSpec(Spec):
     Attributes
     ----------
     name : str
-        A name of `castblast.variables`; in the file it is the key of the entry.
+        A name of `castblast.design.variables`; in the file it is the key of the entry.
     ratio_of : str or None
         Another variable of the recipe. The numbers are then ratios to it: a stemming of 0.4 to 1
         burdens.
@@ -341,7 +342,7 @@ class Recipe(Spec):
 
     @property
     def sampled(self) -> tuple[VariableSpec, ...]:
-        """Variables that the design draws, in the order of `castblast.variables`."""
+        """Variables that the design draws, in the order of `castblast.design.variables`."""
         return tuple(
             self.variables[name]
             for name in DESIGN_NAMES
@@ -350,7 +351,7 @@ class Recipe(Spec):
 
     @property
     def fixed(self) -> tuple[VariableSpec, ...]:
-        """Variables held at one value (or ratio), in the order of `castblast.variables`."""
+        """Variables held at one value (or ratio), in the order of `castblast.design.variables`."""
         return tuple(
             self.variables[name]
             for name in DESIGN_NAMES

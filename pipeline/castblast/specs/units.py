@@ -209,7 +209,7 @@ def convert(value: object, unit: str) -> float:
     value : str, int or float
         ``"165 mm"``; a bare number only when `unit` is ``"1"``.
     unit : str
-        SI unit in UDUNITS spelling, as in `castblast.variables`.
+        SI unit in UDUNITS spelling, as in `castblast.design.variables`.
 
     Returns
     -------

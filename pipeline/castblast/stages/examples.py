@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from castblast.disk.files import write_text
+from castblast.disk.resources import resource
 from castblast.errors import SpecError
-from castblast.files import write_text
-from castblast.resources import resource
 
 #: What is copied: folder of the installation to folder of the copy.
 _COPIED = {

@@ -14,15 +14,15 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from castblast.disk.files import write_text, write_with
+from castblast.disk.reading import read_json
+from castblast.disk.resources import SHIPPED_NETWORKS, is_bare_name, resource
 from castblast.errors import CheckError, SpecError, nearest_name
-from castblast.export.json_file import read_network
 from castblast.extras import require
-from castblast.files import write_text, write_with
 from castblast.network import Network
+from castblast.network.json_file import read_network
 from castblast.progress import ProgressCallback, silent
-from castblast.reading import read_json
-from castblast.resources import SHIPPED_NETWORKS, is_bare_name, resource
-from castblast.stages.fitting import FIT_FILE
+from castblast.stages.training.fitting import FIT_FILE
 
 if TYPE_CHECKING:
     from castblast.export.parity import ParityReport
@@ -193,10 +193,10 @@ def _export_module(
     source: Path, wanted: Sequence[str], verify: bool, progress: ProgressCallback
 ) -> tuple[dict[str, dict[str, bytes]], dict[str, ParityReport]]:
     """Files and reports of a fit that is no chain of dense layers."""
-    from castblast.export.onnx_file import wrap_onnx
+    from castblast.export.onnx.file import wrap_onnx
     from castblast.export.parity import check_wrapped_parity
-    from castblast.surrogate.estimators import bare_model, is_torch_model
-    from castblast.surrogate.fit_store import open_fit
+    from castblast.surrogate.fitting.estimators import bare_model, is_torch_model
+    from castblast.surrogate.fitting.fit_store import open_fit
 
     fit = open_fit(source.parent)
     name, model = fit.spec.name, bare_model(fit.estimator)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from castblast.variables import BURDEN_PARAMETER_SETS, INPUTS, Variable
+from castblast.design.variables import BURDEN_PARAMETER_SETS, INPUTS, Variable
 
 HEADER = ("input", "default", "lowest", "highest", "unit", "meaning")
 

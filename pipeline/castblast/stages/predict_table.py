@@ -15,17 +15,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.design import FaultyRows
+from castblast.design.rule import FaultyRows
+from castblast.design.variables import INPUT_NAMES, VARIABLES
 from castblast.errors import SpecError
 from castblast.names import cell_text
 from castblast.network import Floats, Network, offending_inputs
+from castblast.prediction.answer import answer_document, load_network
+from castblast.prediction.blanks import predict_with_blanks
+from castblast.prediction.columns import ColumnPredictions, explosive_position
 from castblast.specs.quantity import VariableIn
-from castblast.specs.table import ID_HEADS, Form, Table, read_table
-from castblast.specs.table_text import NUMBER
-from castblast.stages.predict import answer_document, load_network
-from castblast.stages.predict_blanks import predict_with_blanks
-from castblast.stages.predict_columns import ColumnPredictions, explosive_position
-from castblast.variables import INPUT_NAMES, VARIABLES
+from castblast.specs.tables.table import ID_HEADS, Form, Table, read_table
+from castblast.specs.tables.text import NUMBER
 
 _FORM = Form(
     columns={name: VariableIn(name) for name in INPUT_NAMES},
@@ -58,7 +58,7 @@ class PredictionTable:
 
     @cached_property
     def rows(self) -> list[dict[str, Any]]:
-        """A document for each design, as `predict.predict` makes it; with its id, if it has one."""
+        """A document for each design, as `answer.predict` makes it; with its id, if it has one."""
         documents = answer_document(self.answers, self.explosive, self.network)
         if not self.table.label:
             return list(documents)
@@ -85,7 +85,8 @@ def predict_csv(
     Parameters
     ----------
     path : Path
-        See `castblast.specs.table`; any inputs, and ids of the rows. Blank cells are completed.
+        See `castblast.specs.tables.table`; any inputs, and ids of the rows. Blank cells are
+        completed.
     network : path, optional
     explosive : str
         For rows without one.

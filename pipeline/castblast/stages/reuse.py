@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 
-from castblast.files import write_text
+from castblast.disk.files import write_text
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _KEY_FILE = "made_from.json"

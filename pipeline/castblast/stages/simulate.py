@@ -11,19 +11,19 @@ from typing import Any
 import numpy as np
 
 from castblast.bands import BAND_WORDS, band_document, show_band, show_value
-from castblast.blast import BlastResult, BlastSettings, make_case, result_values, run_blast
-from castblast.design import as_columns, require_possible
+from castblast.blast.inputs import resolve_inputs
+from castblast.blast.run import BlastResult, BlastSettings, make_case, result_values, run_blast
+from castblast.design.hole import expanded_hole_faults
+from castblast.design.rule import as_columns, require_possible
+from castblast.design.variables import VARIABLES
+from castblast.disk.files import require_writable, write_csv, write_text, written_together
 from castblast.errors import SimulationError, Status
 from castblast.extras import require
-from castblast.files import require_writable, write_csv, write_text, written_together
-from castblast.hole import expanded_hole_faults
-from castblast.inputs import resolve_inputs
 from castblast.nearfield.case import EndMode, TensionMode
 from castblast.specs.case import parse_values
 from castblast.specs.explosive import load_explosive
 from castblast.stages.explosives import require_consistent
 from castblast.stopping import interruptible
-from castblast.variables import VARIABLES
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def simulate(
     explosive : str
         Name in the catalogue or path of an explosive file.
     values : mapping of str to quantity
-        Inputs with units; the rest takes the defaults of `castblast.variables`.
+        Inputs with units; the rest takes the defaults of `castblast.design.variables`.
     mode, tension, parameter_set : str
         See `castblast.specs.case.CaseSpec`.
     out : path, optional

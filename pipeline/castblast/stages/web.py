@@ -8,14 +8,14 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from castblast.disk.files import write_with
+from castblast.disk.reading import read_json
+from castblast.disk.resources import resource
 from castblast.errors import SpecError
-from castblast.files import write_with
 from castblast.network import Network
-from castblast.reading import read_json
-from castblast.resources import resource
 
 if TYPE_CHECKING:
-    from castblast.export.plain import Files
+    from castblast.export.source.plain import Files
 
 SHIPPED_PAGE = "models/chosen/index.html"
 HISTORIES = "histories.json"
@@ -82,7 +82,7 @@ def read_histories(path: Path) -> Mapping[str, Any]:
     from castblast.surrogate.history_modes import FORMAT, fit_history_modes
 
     if path.suffix != ".json":
-        from castblast.dataset.store import open_dataset
+        from castblast.dataset.file.store import open_dataset
 
         return fit_history_modes(open_dataset(path))
     record = read_json(path)

@@ -17,11 +17,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from castblast.dataset.schema import flag_names
+from castblast.dataset.file.schema import flag_names
+from castblast.design.variables import VARIABLES
 from castblast.errors import DatasetError
 from castblast.network import Floats
-from castblast.surrogate.features import varying_inputs
-from castblast.variables import VARIABLES
+from castblast.surrogate.fitting.features import varying_inputs
 
 if TYPE_CHECKING:
     import xarray as xr

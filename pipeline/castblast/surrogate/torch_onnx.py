@@ -11,10 +11,10 @@ from typing import Any
 import torch
 
 from castblast.errors import SpecError
-from castblast.surrogate.custom import importable
-from castblast.surrogate.estimators import bare_model, is_torch_model
-from castblast.surrogate.torch_mlp import as_module, determined
-from castblast.surrogate.training import Fit
+from castblast.surrogate.fitting.estimators import bare_model, is_torch_model
+from castblast.surrogate.fitting.families.custom import importable
+from castblast.surrogate.fitting.families.torch_mlp import as_module, determined
+from castblast.surrogate.fitting.training import Fit
 
 #: Operator sets tried in turn; attention came with the second.
 _OPSETS = (13, 14)

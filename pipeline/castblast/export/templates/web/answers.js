@@ -9,7 +9,7 @@ const outputTitles = {
   expanded_hole_radius: "Expanded hole radius", crushed_zone_radius: "Crushed zone radius",
 };
 
-/** Mean way of a bench thrown level: 2/3 of the reach of its crest (castblast.muckpile.ballistic). */
+/** Mean way of a bench thrown level: 2/3 of the reach of its crest (castblast.muckpile.results.ballistic). */
 export function flightDistance(speed, height) {
   return (2 / 3) * speed * Math.sqrt((2 * height) / gravity);
 }

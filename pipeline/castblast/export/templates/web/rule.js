@@ -1,4 +1,4 @@
-/* The rule of a design, which comes as data from castblast.design: what completes and refuses one. */
+/* The rule of a design, which comes as data from castblast.design.rule: what completes and refuses one. */
 import { network } from "../model.js";
 
 const ruleField = /\{(?:([\d.]+)\*)?(\w+)(?::(\w+))?\}/g;

@@ -1,4 +1,4 @@
-/* A table of designs as people save it: what castblast.specs.table reads is read here too. */
+/* A table of designs as people save it: what castblast.specs.tables.table reads is read here too. */
 const numberForm = /^[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?$/;
 const commaForm = /^[+-]?\d*,\d+(?:[eE][+-]?\d+)?$/;
 const remarkForm = /^\s*(?:#|\/\/)/;

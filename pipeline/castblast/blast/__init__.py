@@ -1,0 +1,1 @@
+"""One blast, or many at once: inputs completed, near field, burden motion."""

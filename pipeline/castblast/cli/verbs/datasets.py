@@ -1,0 +1,124 @@
+"""`castblast dataset`: work on a written dataset."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from castblast.cli.options import OutFolder, Restart, Scheduler, Workers
+from castblast.cli.screen import Screen
+from castblast.cli.verb import verb
+
+app = typer.Typer(
+    help="Check, describe, compare and extend written datasets.", no_args_is_help=True
+)
+
+_Dataset = Annotated[Path, typer.Argument(help="Dataset (netCDF).")]
+
+
+@verb(app, needs=("simulate", "data"))
+def check(screen: Screen, dataset: _Dataset) -> Mapping[str, Any]:
+    """Check a dataset against the format and report all faults (exit code 4 if there are any)."""
+    from castblast.stages.datasets.dataset import check_dataset
+
+    with screen.progress("check") as progress:
+        faults = check_dataset(dataset, progress)
+    for fault in faults:
+        screen.say(f"{dataset}: {fault}")
+    if faults:
+        screen.exit_code = 4
+    else:
+        screen.say(f"{dataset}: no faults")
+    return {"dataset": str(dataset), "faults": faults}
+
+
+@verb(app, needs=("simulate", "data"))
+def describe(screen: Screen, dataset: _Dataset) -> Mapping[str, Any]:
+    """Say what a dataset holds: size, ranges, failures, versions."""
+    from castblast.stages.datasets.dataset import describe_dataset
+
+    description = describe_dataset(dataset)
+    for line in description.lines:
+        screen.say(line)
+    screen.table(description.header, description.rows)
+    return description.document
+
+
+@verb(app, needs=("simulate", "data"), compiles="nearfield")
+def reproduce(
+    screen: Screen,
+    dataset: _Dataset,
+    sample: Annotated[int, typer.Option(min=0, help="Id of the sample.")] = 0,
+) -> Mapping[str, Any]:
+    """Recompute one sample from the file alone and compare it (exit code 4 if it differs)."""
+    from castblast.stages.datasets.dataset import reproduce_sample
+
+    outcome = reproduce_sample(dataset, sample)
+    screen.table(("quantity", "stored", "recomputed", "relative difference"), outcome.rows)
+    screen.say(outcome.verdict)
+    if not outcome.same:
+        screen.exit_code = 4
+    return outcome.document
+
+
+@verb(app, needs=("simulate", "data"), compiles="nearfield")
+def extend(
+    screen: Screen,
+    dataset: _Dataset,
+    add: Annotated[
+        int | None, typer.Option("--add", min=1, help="Samples to draw.", show_default=False)
+    ] = None,
+    design: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV of the samples instead, such as castblast infill writes; all for training.",
+            show_default=False,
+        ),
+    ] = None,
+    out: OutFolder = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    restart: Restart = False,
+) -> Mapping[str, Any]:
+    """Add samples to a dataset: a new file with the next minor version; the old one stays."""
+    from castblast.errors import SpecError
+    from castblast.stages.datasets.extend import extend as run
+
+    rows = add if design is None else design
+    if rows is None or None not in (add, design):
+        message = "give either --add N or --design FILE"
+        raise SpecError(message)
+    with screen.progress("extend") as progress:
+        outcome = run(
+            dataset,
+            rows,
+            out,
+            workers=workers,
+            scheduler=scheduler,
+            restart=restart,
+            progress=progress,
+        )
+    for line in outcome.lines:
+        screen.say(line)
+    return outcome.document
+
+
+@verb(app, needs=("simulate", "data"))
+def diff(
+    screen: Screen,
+    first: Annotated[Path, typer.Argument(help="Dataset (netCDF).")],
+    second: Annotated[Path, typer.Argument(help="Another one, by the same ids.")],
+) -> Mapping[str, Any]:
+    """Say in what two datasets differ (exit code 4 if they do): making, variables, rows, values."""
+    from castblast.stages.datasets.diff import diff_datasets
+
+    with screen.progress("diff") as progress:
+        outcome = diff_datasets(first, second, progress)
+    for line in outcome.lines:
+        screen.say(line)
+    if outcome.rows:
+        screen.table(outcome.header, outcome.rows)
+    if not outcome.same:
+        screen.exit_code = 4
+    return outcome.document

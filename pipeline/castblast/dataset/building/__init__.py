@@ -1,0 +1,1 @@
+"""Building a dataset: shards by workers, put together, or added to another."""

@@ -1,0 +1,1 @@
+"""What decides the rows of a dataset: designs drawn or read, and simulated."""

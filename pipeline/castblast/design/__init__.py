@@ -1,0 +1,1 @@
+"""What a design is: its variables, the one rule that completes and refuses, the hole."""

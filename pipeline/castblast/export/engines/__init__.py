@@ -1,0 +1,1 @@
+"""A bench for other engines: decks, and scripts that ask the network."""

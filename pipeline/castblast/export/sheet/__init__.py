@@ -1,0 +1,1 @@
+"""The network as a workbook, and as a lookup table."""

@@ -1,0 +1,1 @@
+"""The network as source code: C, JavaScript, Python."""

@@ -1,0 +1,1 @@
+"""The balls: records, contact law, state of a run."""

@@ -1,0 +1,1 @@
+"""The bench before firing: shape, rock around it, sizes, packing, timing."""

@@ -1,0 +1,1 @@
+"""One cast: its case, its solution, its restart file."""

@@ -1,0 +1,1 @@
+"""The engine: forces, motion, steps, what is watched on the way."""

@@ -1,0 +1,1 @@
+"""What balls fall on: walls, facets, terrain."""

@@ -1,0 +1,1 @@
+"""Who may touch whom: lists of neighbours, pairs and walls."""

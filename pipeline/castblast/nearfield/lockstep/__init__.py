@@ -1,0 +1,1 @@
+"""Many holes at once, in lockstep."""

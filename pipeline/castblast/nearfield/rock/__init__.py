@@ -1,0 +1,1 @@
+"""One zone of rock: strength, viscosity, a step of the scheme."""

@@ -1,0 +1,1 @@
+"""Answers of a network: designs completed, refused, predicted; light modules only."""

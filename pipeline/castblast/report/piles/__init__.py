@@ -1,0 +1,1 @@
+"""Pictures of benches and piles, and files for viewers."""

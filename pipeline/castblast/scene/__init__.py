@@ -1,0 +1,1 @@
+"""From a bench spec to all that a cast begins with."""

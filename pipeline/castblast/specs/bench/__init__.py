@@ -1,0 +1,1 @@
+"""Bench files and the files that they name."""

@@ -1,0 +1,1 @@
+"""Balls of a bench: sizes to pack, or files of other engines."""

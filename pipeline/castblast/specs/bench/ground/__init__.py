@@ -1,0 +1,1 @@
+"""Ground under and around a bench: heights, points, surfaces."""

@@ -1,0 +1,1 @@
+"""Specs of models: families, features, what is searched."""

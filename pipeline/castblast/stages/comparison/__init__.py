@@ -1,0 +1,1 @@
+"""Compare models: fits, parts, document, page."""

@@ -1,0 +1,1 @@
+"""Make, extend, check and compare datasets."""

@@ -1,0 +1,1 @@
+"""The whole chain at a small size."""

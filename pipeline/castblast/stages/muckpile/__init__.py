@@ -1,0 +1,1 @@
+"""Throw a bench, measure a pile, compare piles."""

@@ -1,0 +1,201 @@
+"""Several muckpiles side by side: mean and scatter of every metric, and their profiles."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from castblast.disk.files import require_writable, tried, write_text, written_together
+from castblast.disk.locks import LOCK_NAME, only_writer
+from castblast.errors import SpecError
+from castblast.muckpile.results.metrics import UNITS, Band, band
+from castblast.muckpile.results.profile import Profile
+from castblast.progress import ProgressCallback, silent
+from castblast.specs.bench.bench import BenchSpec
+from castblast.stages.muckpile.read import FinishedRun, numbers, read_runs
+from castblast.stages.muckpile.results import MuckpileOutcome, bench_content, finite
+from castblast.stages.reuse import forget, is_valid, make_key, mark_valid
+
+_PER_BLOCK = ("block_throw", "block_spread")
+
+
+def compare_runs(folders: Sequence[Path], out: Path) -> MuckpileOutcome:
+    """Compare finished runs, such as one bench with several seeds, or a bench with variants.
+
+    Parameters
+    ----------
+    folders : sequence of path
+        Results of `castblast muckpile`.
+    out : path
+        Folder for ``comparison.json`` and ``profiles.png``.
+
+    Returns
+    -------
+    MuckpileOutcome
+        `document` holds ``ok``, ``faults`` (of the runs), ``runs`` (name to headline metrics),
+        ``bands`` (metric to mean, sd and number of runs that know it) and ``units``.
+
+    Raises
+    ------
+    SpecError
+        Fewer than two runs, or a folder without results or with damaged ones; one line per fault.
+    OutputError
+        Nothing can be written to `out`.
+    """
+    if len(folders) < 2:
+        raise SpecError("a comparison needs at least two runs")
+    runs = read_runs(folders)
+    require_writable(out)
+    documents = [run.document for run in runs]
+    names = _names(folders)
+    bands = metric_bands_of(documents)
+    faults = _run_faults(names, documents)
+    document = {
+        "ok": not faults,
+        "faults": faults,
+        "runs": {
+            name: {key: found[key] for key in UNITS if key not in _PER_BLOCK}
+            for name, found in zip(names, documents, strict=True)
+        },
+        "bands": {name: _plain(found) for name, found in bands.items()},
+        "units": UNITS,
+    }
+    text = json.dumps(finite(document), indent=2) + "\n"
+    files = written_together(
+        out,
+        lambda folder: [
+            write_text(folder / "comparison.json", text),
+            _draw(folder / "profiles.png", runs, names),
+        ],
+    )
+    title = f"{len(folders)} runs: mean and standard deviation"
+    return MuckpileOutcome(document, title, band_rows(bands), files, faults=faults)
+
+
+def _run_faults(names: Sequence[str], documents: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Reasons not to believe a run, each with its name; runs of old versions say nothing."""
+    return [
+        f"{name}: {fault}"
+        for name, found in zip(names, documents, strict=True)
+        for fault in found.get("faults") or ()
+    ]
+
+
+def run_seeds(
+    bench: str | Path,
+    out: Path | None,
+    seeds: int,
+    *,
+    progress: ProgressCallback = silent,
+    **options: Any,
+) -> MuckpileOutcome:
+    """Run a bench with several seeds, from that of its file on, and compare the runs.
+
+    Seeds that were finished before a stop are not run again.
+
+    Parameters
+    ----------
+    bench, out, options
+        As `run_muckpile` takes them; the runs are written to ``seed_K`` in `out`.
+    seeds : int
+        At least 2.
+    progress : callback
+    """
+    from castblast.disk.resources import find_spec
+    from castblast.specs.bench.bench import load_bench
+    from castblast.stages.muckpile.run import run_muckpile
+
+    spec = load_bench(bench)
+    folder = Path("runs") / spec.name if out is None else out
+    first = options.pop("seed", None)
+    first = spec.seed if first is None else first
+    key = _seeds_key(spec, find_spec(bench, "bench").parent, options)
+    folders: list[Path] = []
+    files: list[Path] = []
+    remarks: list[str] = []
+    with tried(folder), only_writer(folder / LOCK_NAME, folder):
+        for k in range(seeds):
+            each = folder / f"seed_{first + k}"
+            folders.append(each)
+
+            def report(share: float, line: str, k: int = k) -> None:
+                progress((k + share) / seeds, f"seed {first + k}: {line}")
+
+            if not is_valid(each, key):
+                forget(each)
+                run = run_muckpile(bench, each, seed=first + k, progress=report, **options)
+                files, remarks = files + run.files, run.remarks
+                mark_valid(each, key)
+        compared = compare_runs(folders, folder)
+        for each in folders:
+            forget(each)
+    return replace(compared, files=files + compared.files, remarks=remarks)
+
+
+def _seeds_key(spec: BenchSpec, beside: Path, options: Mapping[str, Any]) -> dict[str, str]:
+    """All that the runs depend on but their seed, which names their folders."""
+    extras = options.get("extras")
+    named = {"ore": extras.ore} if extras is not None and extras.ore else {}
+    free = ("threads", "packings")
+    asked = {name: value for name, value in options.items() if name not in free}
+    content = bench_content(spec, beside)["bench_sha256"]
+    return make_key(bench=content, options=repr(sorted(asked.items())), **named)
+
+
+def metric_bands_of(documents: Sequence[Mapping[str, Any]]) -> dict[str, Band]:
+    """Bands of all metrics that the runs have in common; per-block ones only for equal blocks."""
+    bands = {}
+    for name in UNITS:
+        values = [numbers(document.get(name)) for document in documents]
+        if len({value.shape for value in values}) == 1:
+            bands[name] = band(values)
+    return bands
+
+
+def band_rows(bands: Mapping[str, Band]) -> list[tuple[str, str, str]]:
+    """Bands of single numbers for people: name, mean and deviation, unit."""
+    rows = []
+    for name, found in bands.items():
+        if found.mean.ndim:
+            continue
+        spread = "" if math.isnan(found.sd) else f" ± {float(found.sd):.2g}"
+        words = "-" if math.isnan(found.mean) else f"{float(found.mean):.3g}{spread}"
+        rows.append((name.replace("_", " "), words, UNITS[name]))
+    return rows
+
+
+def _plain(found: Band) -> dict[str, Any]:
+    return {key: np.asarray(value).tolist() for key, value in found._asdict().items()}
+
+
+def _names(folders: Sequence[Path]) -> list[str]:
+    """Names of the folders; whole paths where two have the same name."""
+    short = [folder.resolve().name for folder in folders]
+    return short if len(set(short)) == len(short) else [str(folder) for folder in folders]
+
+
+def _draw(path: Path, runs: Sequence[FinishedRun], names: Sequence[str]) -> Path:
+    from castblast.report.piles.movement_figures import draw_profiles
+
+    profiles = [run.pile for run in runs]
+    widest = max(runs, key=lambda run: float(run.ground.x[-1]))
+    low = max(float(profile.x[0]) for profile in profiles)
+    high = max(float(profile.x[-1]) for profile in profiles)
+    x = np.linspace(low, high, 400)
+    heights = np.stack([np.interp(x, profile.x, profile.height) for profile in profiles])
+    scatter = band(list(heights))
+    return draw_profiles(
+        path,
+        dict(zip(names, profiles, strict=True)),
+        runs[0].bench,
+        widest.ground,
+        band=(Profile(x, scatter.mean), scatter.sd) if len(runs) > 2 else None,
+        band_words="one standard deviation over the runs",
+        title="Mean surface of each run",
+    )

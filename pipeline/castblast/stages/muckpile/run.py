@@ -1,0 +1,363 @@
+"""Throw a bench: pack or read the balls, fire, settle, and write state, profile and pictures."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from castblast.disk.files import publish, staged, tried
+from castblast.disk.locks import LOCK_NAME, only_writer
+from castblast.disk.resources import find_spec
+from castblast.errors import SimulationError, SpecError, Status
+from castblast.muckpile.balls.particles import Particles
+from castblast.muckpile.bench.enclosure import rock_walls
+from castblast.muckpile.bench.geometry import Bench
+from castblast.muckpile.bench.given import pressed_share
+from castblast.muckpile.bench.surroundings import bench_walls
+from castblast.muckpile.cast.solver import CastCase, CastResult, run_cast
+from castblast.muckpile.engine.simulation import Simulation
+from castblast.muckpile.engine.threads import thread_count
+from castblast.muckpile.ground.terrain import wall_faults
+from castblast.muckpile.ground.walls import Walls, join, slope
+from castblast.muckpile.results.metrics import pile_metrics
+from castblast.progress import ProgressCallback, silent, with_time_left
+from castblast.scene.begun import Start
+from castblast.scene.bounds import BallSizes, require_bounds
+from castblast.scene.options import with_numerics, with_options
+from castblast.scene.plan import Plan, make_plan
+from castblast.scene.start import make_start
+from castblast.specs.bench.balls.spec import ChosenSizes
+from castblast.specs.bench.bench import BenchSpec, load_bench
+from castblast.specs.bench.ground.spec import Ground, read_ground, rough_ground
+from castblast.stages.muckpile.deck import Decks, write_decks
+from castblast.stages.muckpile.extras import Extras, ReadExtras, read_extras
+from castblast.stages.muckpile.frames import Frames
+from castblast.stages.muckpile.ore import follow_ore
+from castblast.stages.muckpile.results import (
+    OPTIONAL_FILES,
+    MuckpileOutcome,
+    bench_content,
+    describe_run,
+    write_results,
+)
+from castblast.stages.muckpile.velocity import velocity_remarks
+from castblast.stopping import StopRequest, deferred_stop
+
+_PACKING_SHARE, _CAST_SHARE = 0.25, 0.95
+_RESTART, _FAILED = "restart.npz", "unstable"
+#: Simulated time [s] that is enough for one step.
+_ONE_STEP = 1e-12
+
+
+def run_muckpile(
+    bench: str | Path,
+    out: Path | None = None,
+    *,
+    balls: int | None = None,
+    threads: int | None = None,
+    velocity: str | float | None = None,
+    seed: int | None = None,
+    precision: str | None = None,
+    sleeping: bool | None = None,
+    packings: Path | None = None,
+    extras: Extras = Extras(),  # noqa: B008 - a record of constants
+    decks: Decks = Decks(),  # noqa: B008 - a record of constants
+    progress: ProgressCallback = silent,
+) -> MuckpileOutcome:
+    """Run a bench file; a run that was stopped goes on where it was, to the same numbers.
+
+    Results appear together when all of them are written; until then those of an earlier run stay.
+
+    Parameters
+    ----------
+    bench : str or path
+        Bench file, or the name of one that comes with castblast.
+    out : path, optional
+        Folder of the results; default ``runs/NAME``.
+    balls : int, optional
+        About this many balls instead of those of the file; changes their size.
+    threads : int, optional
+        Default: all cores. The numbers do not depend on it.
+    velocity : str or float [m s-1], optional
+        Instead of that of the file; a text carries its unit.
+    seed : int, optional
+        Instead of that of the file.
+    precision : {"mixed", "float64"}, optional
+    sleeping : bool, optional
+        Instead of `numerics` of the file.
+    packings : path, optional
+        Folder of packings, named by the hash of their content: one that is there is used again,
+        whatever run made it. Default: ``packings`` in `out`.
+    extras : Extras
+        Ore, animation, files for ParaView.
+    decks : Decks
+        Folders for the input of LAMMPS or LIGGGHTS. With one the bench is packed and checked but
+        not thrown.
+    progress : callback
+
+    Raises
+    ------
+    SpecError
+        Faults of the bench file, of a file of balls, holes, ground or ore, or of an extra; a wall
+        that cuts the balls, a step above the stable one, too little memory, or what another engine
+        cannot take. Nothing has been simulated then, and a packing that was made is kept.
+    OutputError
+        The folder cannot be written to, or the disk is full.
+    LockedError
+        Another run writes into the folder.
+    SimulationError
+        The simulation became unstable; its last restart file is kept.
+    Stopped
+        Ctrl-C or SIGTERM: what has been done is kept in ``restart.npz``, or beside the packings.
+    """
+    path = find_spec(bench, "bench")
+    spec = with_options(load_bench(path), balls, velocity)
+    spec = with_numerics(spec, precision, sleeping)
+    if seed is not None:
+        spec = spec.model_copy(update={"seed": seed})
+    geometry = spec.bench.to_bench()
+    ore_of_bench = path.parent / spec.ore if spec.ore else None
+    wanted = read_extras(extras, geometry, ore_of_bench, spec.frame)
+    ground = read_ground(spec.ground, path.parent, geometry)
+    walls = bench_surroundings(spec, geometry, ground)
+    plan = make_plan(spec, geometry, path.parent, one_speed=velocity is not None)
+    folder = Path("runs") / spec.name if out is None else out
+    job = _Job(
+        spec=spec,
+        bench=geometry,
+        beside=path.parent,
+        folder=folder,
+        plan=plan,
+        walls=walls,
+        ground=ground,
+        extras=extras,
+        wanted=wanted,
+        threads=threads or 0,
+    )
+    packings = folder / "packings" if packings is None else packings
+    with tried(folder), only_writer(folder / LOCK_NAME, folder):
+        with deferred_stop() as stop:
+            report = _long_part(progress, 0.0, _PACKING_SHARE)
+            start, case, more = _prepare(job, packings, report, stop)
+        if decks.wanted:
+            written = write_decks(spec, case, decks)
+            remarks = velocity_remarks(plan.prediction)
+            return _with_remarks(replace(written, remarks=remarks), ground)
+        return _throw(job, start, case, more, progress)
+
+
+class _Job(NamedTuple):
+    """What is asked for, read and checked."""
+
+    spec: BenchSpec
+    bench: Bench
+    beside: Path
+    folder: Path
+    plan: Plan
+    walls: Walls
+    ground: Ground
+    extras: Extras
+    wanted: ReadExtras
+    threads: int
+
+    @property
+    def restart(self) -> Path:
+        """File that keeps the state of the cast until all results are written."""
+        return self.folder / _RESTART
+
+
+def _prepare(
+    job: _Job, packings: Path, progress: ProgressCallback, stop: StopRequest
+) -> tuple[Start, CastCase, dict[str, Any]]:
+    """Balls before firing, the case, and what the document says of both."""
+    spec = job.spec
+    frames = job.extras.order(job.wanted.interval)
+
+    def require(sizes: BallSizes) -> None:
+        require_bounds(spec, sizes, job.folder, job.threads, frames)
+
+    start, sizes = make_start(
+        spec, job.bench, job.plan, job.beside, packings, job.threads, progress, require, stop
+    )
+    case = _case(spec, job.walls, start.balls, job.plan, job.threads)
+    _require_possible(spec, case, job.ground)
+    more = {"fragments": _describe_sizes(sizes), **bench_content(spec, job.beside)}
+    return start, case, more
+
+
+def _throw(
+    job: _Job, start: Start, case: CastCase, more: dict[str, Any], progress: ProgressCallback
+) -> MuckpileOutcome:
+    """Simulate the cast and write all results at once; only then is its restart file removed."""
+    spec, wanted = job.spec, job.wanted
+    # Frames of a run that was stopped wait for it beside its restart file.
+    resume = job.extras.frames and job.restart.exists()
+    with staged(
+        job.folder, resume=resume, keep=job.extras.frames, replaces=OPTIONAL_FILES
+    ) as scratch:
+        cast = _long_part(progress, _PACKING_SHARE, _CAST_SHARE)
+        result, frames = _simulate(job, case, scratch, cast)
+        progress(_CAST_SHARE, "writing files and pictures")
+        metrics = pile_metrics(
+            start.balls,
+            result.particles,
+            job.bench,
+            block_velocity=case.block_velocity,
+            walls=case.walls,
+        )
+        ore = follow_ore(wanted.ore, wanted.plan, case, result)
+        plan = job.plan
+        outcome = describe_run(spec, plan.speed, plan.prediction, start, result, metrics, ore)
+        outcome = _with_remarks(replace(outcome, document=outcome.document | more), job.ground)
+        files = write_results(scratch, spec, case, result, outcome.document, ore, plan.label)
+        files += frames
+    job.restart.unlink(missing_ok=True)
+    progress(1.0, f"{result.time:.1f} s simulated")
+    return replace(outcome, files=[job.folder / path.relative_to(scratch) for path in files])
+
+
+def _with_remarks(outcome: MuckpileOutcome, ground: Ground) -> MuckpileOutcome:
+    """Outcome that says what was mended, left out or found odd in files of ground."""
+    if not ground.remarks:
+        return outcome
+    document = outcome.document | {"ground_remarks": list(ground.remarks)}
+    return replace(outcome, document=document, remarks=[*ground.remarks, *outcome.remarks])
+
+
+def _simulate(
+    job: _Job, case: CastCase, scratch: Path, progress: ProgressCallback
+) -> tuple[CastResult, list[Path]]:
+    """Throw the bench; frames along the way are kept even if it fails."""
+    frames, files, extras = None, [], job.extras
+    if extras.frames:
+        case = case._replace(snapshot_interval=job.wanted.interval)
+        frames = Frames(
+            scratch,
+            case,
+            job.bench,
+            animation=extras.animation,
+            vtk=extras.vtk,
+            vtkhdf=extras.vtkhdf,
+        )
+    with deferred_stop() as stop:
+        result = run_cast(case, progress, frames, job.restart, stop=stop)
+    if frames is not None:
+        progress(1.0, "writing frames")
+        files = frames.close()
+    if Status(result.status) is Status.UNSTABLE_STEP:
+        message = (
+            f"{job.spec.name}: the simulation became unstable at {result.failed_time:.3g} s "
+            f"(ball {result.failed_ball})"
+        )
+        if job.restart.exists():
+            message += f"; its last good state is kept in {job.restart}"
+        if files:
+            aside = job.folder / _FAILED
+            shutil.rmtree(aside, ignore_errors=True)
+            publish(scratch, aside)
+            message += f"; its frames are in {aside}"
+        raise SimulationError(message)
+    return result, files
+
+
+def _part(progress: ProgressCallback, low: float, high: float) -> ProgressCallback:
+    """Progress of one part of the run; the share, an estimate there, never falls."""
+    reached = 0.0
+
+    def report(share: float, line: str) -> None:
+        nonlocal reached
+        reached = max(reached, share)
+        progress(low + reached * (high - low), line)
+
+    return report
+
+
+def _long_part(progress: ProgressCallback, low: float, high: float) -> ProgressCallback:
+    """The same for a part that takes long: with the time that is left of it."""
+    return with_time_left(_part(progress, low, high))
+
+
+def _describe_sizes(chosen: ChosenSizes | None) -> dict[str, Any] | None:
+    """What fragments the balls stand for, and what share of their mass is left out."""
+    if chosen is None or chosen.cut is None or chosen.curve is None:
+        return None
+    cut = chosen.cut
+    return {
+        "curve": type(chosen.curve).__name__.lower(),
+        **chosen.curve._asdict(),
+        "smallest_ball": cut.smallest,
+        "largest_ball": cut.largest,
+        "mass_share_finer": cut.finer,
+        "mass_share_coarser": cut.coarser,
+    }
+
+
+def bench_surroundings(spec: BenchSpec, bench: Bench, ground: Ground) -> Walls:
+    """All that balls meet: floor, rock around the bench, slope, ground."""
+    if bench.corners:
+        parts = [rock_walls(bench)]
+    else:
+        parts = [bench_walls(bench, rear=spec.bench.rear, ends=spec.bench.ends)]
+    if spec.slope is not None:
+        parts.append(slope(spec.slope.distance, spec.slope.angle))
+    if spec.ground:
+        parts.append(ground.walls)
+    return join(*parts)
+
+
+def _case(spec: BenchSpec, walls: Walls, balls: Particles, plan: Plan, threads: int) -> CastCase:
+    if spec.firing.pattern == "none":
+        balls = balls._replace(block=np.full_like(balls.block, -1))
+    return CastCase(
+        particles=balls,
+        law=spec.contact.to_law(),
+        walls=walls,
+        block_delay=plan.delay,
+        block_velocity=plan.velocity,
+        hold_unfired=spec.firing.hold_unfired,
+        max_time=spec.stop.longest_time,
+        stop_energy_ratio=spec.stop.energy_ratio,
+        stop_duration=spec.stop.duration,
+        step_safety=spec.numerics.step_safety,
+        time_step=spec.numerics.time_step or 0.0,
+        threads=threads,
+        precision=spec.numerics.precision,
+        sleeping=spec.numerics.sleeping,
+    )
+
+
+def _require_possible(spec: BenchSpec, case: CastCase, ground: Ground) -> None:
+    """Refuse walls that cut the balls, rough ground, and a fixed step above the stable one."""
+    allowed = pressed_share(case.particles, case.law, case.gravity)
+    cuts = wall_faults(case.walls, case.particles, allowed)
+    faults = [f"{spec.name}: {cut}" for cut in cuts]
+    faults += rough_ground(ground, float(case.particles.radius.mean()))
+    if not faults and case.time_step > 0.0:
+        stable = _stable_step(case)
+        if case.time_step > stable:
+            faults.append(
+                f"{spec.name}: numerics.time_step: {case.time_step:.3g} s: above the stable step "
+                f"of these balls, {stable:.3g} s; leave it out to follow the stability rule"
+            )
+    if faults:
+        raise SpecError("\n".join(faults))
+
+
+def _stable_step(case: CastCase) -> float:
+    """Stable step [s] of the balls where they are."""
+    held = np.zeros(len(case.particles.radius), dtype=np.bool_)
+    with thread_count(case.threads):
+        run = Simulation(
+            case.particles,
+            case.law,
+            case.walls,
+            held,
+            step_safety=1.0,
+            ballistic=False,
+        )
+        run.run(_ONE_STEP, np.inf)
+    return float(run.smallest_step)

@@ -1,0 +1,130 @@
+"""Fit surrogates on a dataset; each goes to a folder of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import floor
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from castblast.disk.resources import resource
+from castblast.progress import ProgressCallback, silent
+from castblast.stages.training.fitting import (
+    fit_all,
+    fit_files,
+    note_dataset,
+    read_rows,
+    require_training,
+)
+
+if TYPE_CHECKING:
+    from castblast.surrogate.fitting.training import Fit
+
+#: Where the lab book of runs is kept.
+RUNS_FOLDER = Path("runs")
+
+
+@dataclass(frozen=True)
+class TrainOutcome:
+    """What a verb found: a document and the same for people."""
+
+    document: dict[str, Any]
+    title: str
+    header: list[str]
+    rows: list[list[str]]
+    lines: list[str] = field(default_factory=list)
+
+
+def train(
+    dataset: Path,
+    specs: Sequence[Path],
+    out: Path | None = None,
+    *,
+    workers: int | None = 1,
+    tracking: bool = False,
+    runs: Path = RUNS_FOLDER,
+    allow_code: bool = False,
+    progress: ProgressCallback = silent,
+) -> TrainOutcome:
+    """Fit every spec and score it on rows never trained on; fits that are there stay.
+
+    Parameters
+    ----------
+    dataset : path
+        NetCDF written by `castblast generate`.
+    specs : sequence of path
+        Model specs (YAML); none: the reference.
+    out : path, optional
+        One folder per fit goes here; default ``fits`` beside the dataset.
+    workers : int, optional
+        Fits at a time; None: the cores there are.
+    tracking : bool
+        Keep a record in MLflow under `runs`; changes no result.
+    allow_code : bool
+        Run the Python code that specs of kind ``custom`` name.
+    progress : callable
+
+    Raises
+    ------
+    MissingLibraryError
+        A library that training, one of the specs or the record needs is not installed.
+    SpecError
+        An unusable spec, or one that runs code of its own.
+    DatasetError
+        An unusable dataset: damaged, missing columns, too few rows.
+    """
+    from castblast.specs.models.model import read_model_specs, refuse_code
+
+    chosen = read_model_specs(list(specs) or [resource("models/specs/reference_mlp.yaml")])
+    refuse_code(chosen, allowed=allow_code)
+    require_training("castblast train", chosen, tracking=tracking)
+    from castblast.dataset.file.store import open_dataset
+    from castblast.disk.files import require_writable
+
+    table = read_rows(open_dataset(dataset), chosen, dataset)
+    out = dataset.parent / "fits" if out is None else out
+    require_writable(out)
+    if tracking:
+        require_writable(runs)
+    note_dataset(out, dataset)
+    fits = fit_all(chosen, table, out, workers=workers, progress=progress)
+    if tracking:
+        from castblast.surrogate.keeping.tracking import MlflowTracker
+
+        files = {fit.spec.name: fit_files(out / fit.spec.name) for fit in fits}
+        MlflowTracker(runs).record_fits(fits, files)
+    return _outcome(fits, out)
+
+
+def _outcome(fits: Sequence[Fit], out: Path) -> TrainOutcome:
+    targets = list(dict.fromkeys(name for fit in fits for name in fit.table.target_names))
+    header = ["model", "rows", *(f"{name.replace('_', ' ')}: R², 95 %" for name in targets)]
+    rows = []
+    for fit in fits:
+        scores = fit.scores("test")
+        cells = [
+            f"{show_r_squared(scores[name].r2)}, {show_share(scores[name].relative_error_95)}"
+            if name in scores
+            else ""
+            for name in targets
+        ]
+        rows.append([fit.spec.name, f"{len(fit.table.rows('train')):,}", *cells])
+    title = f"{len(fits[0].table.rows('test')):,} test rows never trained on"
+    document = {
+        "out": str(out),
+        "fits": {fit.spec.name: fit.to_document() for fit in fits},
+        "seconds": {fit.spec.name: fit.seconds for fit in fits},
+    }
+    lines = [f"wrote {out}", f"next: castblast compare, which ranks what lies in {out}"]
+    return TrainOutcome(document, title, header, rows, lines)
+
+
+def show_r_squared(value: float | None) -> str:
+    """R² cut, not rounded, to five places: a model that misses is never shown as 1."""
+    return "-" if value is None else f"{floor(value * 1e5) / 1e5:.5f}"
+
+
+def show_share(value: float | None) -> str:
+    """A fraction in percent."""
+    return "-" if value is None else f"{value:.2%}"

@@ -1,0 +1,1 @@
+"""What decides a fit: rows, columns, models, training, bands."""

@@ -1,0 +1,1 @@
+"""Judges of fits: league, physics gate, shifts, strata, Sobol indices."""

@@ -1,0 +1,1 @@
+"""Searches: settings of a model, and the next designs to simulate."""

@@ -1,0 +1,67 @@
+"""Precision and sleep of a run: bench file, command line over it, and what a run says it used."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from castblast.errors import SpecError
+from castblast.specs.bench.bench import load_bench
+from castblast.stages.muckpile.run import run_muckpile
+
+BENCH: dict[str, Any] = {
+    "name": "heap",
+    "bench": {"length": "4 m", "width": "4 m", "height": "3 m", "burden": "2 m", "spacing": "2 m"},
+    "velocity": "6 m/s",
+    "balls": {"count": 100},
+    "stop": {"longest_time": "0.05 s"},
+    "numerics": {"sleeping": True},
+}
+
+
+def written(folder: Path, **change: Any) -> Path:
+    path = folder / "bench.yaml"
+    path.write_text(yaml.safe_dump(BENCH | change))
+    return path
+
+
+def test_defaults_and_file(tmp_path: Path) -> None:
+    """Mixed precision unless the file asks for double; nobody sleeps unless it says so."""
+    plain = load_bench(written(tmp_path, numerics={})).numerics
+    assert (plain.precision, plain.sleeping) == ("mixed", False)
+    asked = load_bench(written(tmp_path, numerics={"precision": "float64", "sleeping": True}))
+    assert (asked.numerics.precision, asked.numerics.sleeping) == ("float64", True)
+    with pytest.raises(SpecError, match=r"numerics\.precision"):
+        load_bench(written(tmp_path, numerics={"precision": "float32"}))
+
+
+def test_an_unknown_precision_is_refused_before_anything_is_packed(tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match=r"--precision: mixd: .*did you mean 'mixed'"):
+        run_muckpile(written(tmp_path), tmp_path / "out", precision="mixd")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_run_says_what_it_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command line goes over the file; what it leaves out stays as the file has it."""
+    monkeypatch.setattr("castblast.stages.muckpile.run.write_results", lambda *_, **__: [])
+    seen = []
+    run = run_muckpile.__globals__["run_cast"]
+    monkeypatch.setattr(
+        "castblast.stages.muckpile.run.run_cast",
+        lambda case, *rest, **options: (
+            seen.append((case.precision, case.sleeping)),
+            run(case, *rest, **options),
+        )[1],
+    )
+    path = written(tmp_path)
+    document = run_muckpile(path, tmp_path / "out", threads=1, precision="float64").document
+    assert document["numerics"]["precision"] == "float64"
+    assert document["numerics"]["sleeping"] is True
+    assert document["ledger"]["slept"] == 0.0
+    document = run_muckpile(path, tmp_path / "out", threads=1, sleeping=False).document
+    assert document["numerics"]["precision"] == "mixed"
+    assert document["numerics"]["sleeping"] is False
+    assert seen == [("float64", True), ("mixed", False)]
