@@ -15,10 +15,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from castblast.dataset.file.store import reading_dataset
-from castblast.network import Floats, Network, density_score, in_domain, scale_columns
+from castblast.network import Network, density_score, in_domain, scale_columns
 from castblast.specs.models.model import PAPER_TARGETS, RidgeSpec
 from castblast.specs.recipe import Recipe, recipe_from_text
 from castblast.stages.datasets.infill import shares_of
@@ -26,12 +25,13 @@ from castblast.surrogate.fitting.conformal import band_coverage
 from castblast.surrogate.fitting.density import LEVEL, fit_density
 from castblast.surrogate.fitting.features import Table, read_table
 from castblast.surrogate.fitting.training import fit_spec
+from castblast.types import BoolArray, FloatArray
 
 COPIES = 20
 TERMS = (1, 2, 4, 8, 16)
 
 
-def in_design(recipe: Recipe, rows: dict[str, Floats]) -> NDArray[np.bool_]:
+def in_design(recipe: Recipe, rows: dict[str, FloatArray]) -> BoolArray:
     """Whether rows (n,) lie in the ranges and constraints of a recipe."""
     full = {**rows}
     known = "charge_length" if "charge_length" in rows else "stemming_length"
@@ -44,7 +44,7 @@ def in_design(recipe: Recipe, rows: dict[str, Floats]) -> NDArray[np.bool_]:
     return np.asarray(inside & (full["charge_length"] >= rules.minimum_charge_length))
 
 
-def shuffled(table: Table, names: tuple[str, ...]) -> dict[str, Floats]:
+def shuffled(table: Table, names: tuple[str, ...]) -> dict[str, FloatArray]:
     """Test rows with every column shuffled, several times over."""
     rng = np.random.default_rng(0)
     test = table.frame.iloc[table.rows("test")]
@@ -54,7 +54,7 @@ def shuffled(table: Table, names: tuple[str, ...]) -> dict[str, Floats]:
     }
 
 
-def distances(train: Floats, rows: Floats) -> Floats:
+def distances(train: FloatArray, rows: FloatArray) -> FloatArray:
     """Mean distance to the five nearest training rows in whitened inputs: every row is kept."""
     from scipy.spatial import cKDTree
 

@@ -21,17 +21,17 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from castblast.dataset.building.extend import read_existing
 from castblast.dataset.rows.design import Design, extend_design
 from castblast.dataset.rows.simulation import BlastSimulator, blast_simulator
 from castblast.errors import Status
-from castblast.network import Floats, Layer, run_layers
+from castblast.network import Layer, run_layers
 from castblast.specs.recipe import Recipe
 from castblast.surrogate.fitting.conformal import conformal_band
 from castblast.surrogate.fitting.families.levenberg import fit_dense
 from castblast.surrogate.searching.infill import POOL_FACTOR, choose_batch, infill_worth
+from castblast.types import FloatArray, IntArray
 
 #: One target of the near field and the one of the burden motion.
 TARGETS = ("crushed_zone_radius", "burden_velocity")
@@ -51,9 +51,9 @@ FIGURES = ("within_95", "within_99", "worst", "rms_log")
 class Rows(NamedTuple):
     """Simulated rows: features as the networks see them (unscaled), and log targets."""
 
-    features: Floats
-    kinds: NDArray[np.int64]
-    targets: Floats
+    features: FloatArray
+    kinds: IntArray
+    targets: FloatArray
 
     def joined(self, other: Rows) -> Rows:
         """These rows and then the others."""
@@ -64,16 +64,16 @@ class Ensemble(NamedTuple):
     """Networks with their common scalings: one per member and target."""
 
     members: list[list[tuple[Layer, ...]]]
-    mean: Floats
-    scale: Floats
-    target_mean: Floats
-    target_scale: Floats
+    mean: FloatArray
+    scale: FloatArray
+    target_mean: FloatArray
+    target_scale: FloatArray
 
-    def scaled(self, features: Floats) -> Floats:
+    def scaled(self, features: FloatArray) -> FloatArray:
         """Features as the first layer takes them, without the explosive."""
         return (features - self.mean) / self.scale
 
-    def answers(self, features: Floats, kinds: NDArray[np.int64]) -> Floats:
+    def answers(self, features: FloatArray, kinds: IntArray) -> FloatArray:
         """Log targets of every member, (members, n, m)."""
         x = np.concatenate([self.scaled(features), np.eye(4)[kinds]], axis=1)
         scaled = np.stack(
@@ -85,7 +85,7 @@ class Ensemble(NamedTuple):
         return np.asarray(scaled * self.target_scale + self.target_mean)
 
 
-def features_of(inputs: dict[str, Floats]) -> Floats:
+def features_of(inputs: dict[str, FloatArray]) -> FloatArray:
     """Columns of the networks: logarithms where a design spans a decade or so."""
     return np.stack(
         [np.log(inputs[name]) if name in LOGGED else inputs[name] for name in FEATURES], axis=1
@@ -111,7 +111,7 @@ def fit_ensemble(rows: Rows, seed: int) -> Ensemble:
     return Ensemble(members, mean, scale, target_mean, target_scale)
 
 
-def simulate(simulator: BlastSimulator, design: Design, chosen: NDArray[np.int64]) -> Rows:
+def simulate(simulator: BlastSimulator, design: Design, chosen: IntArray) -> Rows:
     """Simulate rows of a design; the few that fail fall away."""
     inputs = {name: values[chosen] for name, values in design.inputs.items()}
     kinds = design.explosive[chosen].astype(np.int64)
@@ -138,7 +138,7 @@ class Process:
         self.kernels = [start + WhiteKernel(1e-4)] * len(TARGETS)
         self.kernels = [model.kernel_ for model in self._fit(rows, "fmin_l_bfgs_b")]
 
-    def _inputs(self, rows: Rows) -> Floats:
+    def _inputs(self, rows: Rows) -> FloatArray:
         scaled = (rows.features - self.mean) / self.scale
         return np.concatenate([scaled, 2.0 * np.eye(4)[rows.kinds]], axis=1)
 
@@ -151,14 +151,14 @@ class Process:
             for j, kernel in enumerate(self.kernels)
         ]
 
-    def predict(self, rows: Rows, test: Rows) -> Floats:
+    def predict(self, rows: Rows, test: Rows) -> FloatArray:
         """Log targets of the test rows after fitting to `rows`."""
         x = self._inputs(test)
         scaled = np.stack([model.predict(x) for model in self._fit(rows, None)], axis=1)
         return np.asarray(scaled * self.target_scale + self.target_mean)
 
 
-def judge(predicted: Floats, test: Rows) -> Iterator[dict[str, Any]]:
+def judge(predicted: FloatArray, test: Rows) -> Iterator[dict[str, Any]]:
     """Figures per target of predicted log targets of the test rows."""
     steps = predicted - test.targets
     errors = np.abs(np.expm1(steps))

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from study_cases import ROOT, draw_cases
 
 from castblast.blast.run import BlastCase
@@ -37,8 +36,8 @@ from castblast.nearfield.setup import (
 )
 from castblast.nearfield.solver import _annulus
 from castblast.report.style import CYCLE, GREY, in_style, new_figure, save_figure
+from castblast.types import FloatArray
 
-FloatArray: TypeAlias = NDArray[np.float64]
 Change: TypeAlias = Callable[[Annulus], Annulus]
 
 PAGE = ROOT / "pipeline/docs/mesh_study.md"

@@ -26,7 +26,6 @@ from time import process_time
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from castblast.disk.files import write_text
 from castblast.muckpile.balls.contact import ContactLaw
@@ -38,6 +37,7 @@ from castblast.muckpile.bench.surroundings import bench_walls
 from castblast.muckpile.cast.solver import CastCase, CastResult, run_cast
 from castblast.muckpile.results.metrics import pile_metrics
 from castblast.muckpile.results.profile import mean_profile, surface_height
+from castblast.types import FloatArray
 
 BENCH = Bench(length=6.0, width=9.0, height=6.0, burden=3.0, spacing=3.0)
 SPEED = 12.7
@@ -184,7 +184,7 @@ def read_runs(folder: Path) -> list[list[dict[str, Any]]]:
     return found
 
 
-def column(runs: list[list[dict[str, Any]]], way: int, name: str) -> NDArray[np.float64]:
+def column(runs: list[list[dict[str, Any]]], way: int, name: str) -> FloatArray:
     """One number of one way over the seeds."""
     return np.array([seed[way][name] for seed in runs], dtype=np.float64)
 
@@ -203,7 +203,7 @@ def print_differences(runs: list[list[dict[str, Any]]]) -> None:
         print(f"| {name} | {unit} | " + " | ".join(cells) + " |")
 
 
-def _profiles(runs: list[list[dict[str, Any]]], way: int) -> NDArray[np.float64]:
+def _profiles(runs: list[list[dict[str, Any]]], way: int) -> FloatArray:
     return np.array([seed[way]["profile"] for seed in runs])
 
 
@@ -230,7 +230,7 @@ def print_costs(runs: list[list[dict[str, Any]]]) -> None:
     print("\n| way | largest residual of the ledger | slept | asleep at the end | seconds |")
     print("|---|---|---|---|---|")
     for number, way in enumerate(WAYS):
-        get: Callable[[str], NDArray[np.float64]] = lambda name, n=number: column(runs, n, name)  # type: ignore[misc] # noqa: E731
+        get: Callable[[str], FloatArray] = lambda name, n=number: column(runs, n, name)  # type: ignore[misc] # noqa: E731
         print(
             f"| {way} | {100.0 * np.abs(get('residual')).max():.3f} % "
             f"| {100.0 * get('slept').mean():.4f} % "

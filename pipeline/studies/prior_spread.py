@@ -13,13 +13,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import norm, qmc
 
 from castblast.blast.run import batch_values, run_blasts
 from castblast.design.variables import VARIABLES
 from castblast.errors import Status
 from castblast.specs.explosive import load_explosive
+from castblast.types import FloatArray
 
 TARGETS = (
     "equilibrium_pressure", "expanded_hole_radius", "crushed_zone_radius", "plastic_zone_radius",
@@ -56,7 +56,7 @@ def main() -> None:
             )
 
 
-def drawn(groups: list[str]) -> dict[str, NDArray[np.float64]]:
+def drawn(groups: list[str]) -> dict[str, FloatArray]:
     """Columns of inputs: the design, and the parameters of the groups drawn."""
     normal = {k: v for group in groups for k, v in LOGNORMAL.get(group, {}).items()}
     even = {k: v for group in groups for k, v in UNIFORM.get(group, {}).items()}
@@ -70,7 +70,7 @@ def drawn(groups: list[str]) -> dict[str, NDArray[np.float64]]:
     return columns
 
 
-def answers(columns: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+def answers(columns: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     """Targets of the designs that were solved."""
     anfo = load_explosive("anfo").to_explosive()
     batch = run_blasts([anfo], np.zeros(DRAWS, dtype=np.int64), columns)

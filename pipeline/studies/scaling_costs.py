@@ -32,7 +32,8 @@ from scaling_runs import (
 
 from castblast.dataset.building.shards import ShardTask, Span, write_shard
 from castblast.dataset.rows.design import Design
-from castblast.dataset.rows.simulation import BatchResult, FloatArray
+from castblast.dataset.rows.simulation import BatchResult
+from castblast.types import FloatArray
 
 #: Rows of the shards of physics that are compared: the difference is what a shard costs by itself.
 _SHORT_SHARD = 256

@@ -22,7 +22,6 @@ from typing import NamedTuple
 import numpy as np
 import psutil  # type: ignore[import-untyped]
 
-from castblast.blast.inputs import IntArray
 from castblast.dataset.building.process import peak_memory
 from castblast.dataset.building.shards import Span, read_shard, write_shard
 from castblast.dataset.file.provenance import ExplosiveSource, load_explosives
@@ -31,6 +30,7 @@ from castblast.dataset.rows.simulation import BatchResult, BlastSimulator, Colum
 from castblast.design.variables import OUTPUT_NAMES
 from castblast.specs.recipe import RecipeSource, load_recipe
 from castblast.stages.datasets.generate import produce
+from castblast.types import IndexArray
 
 STUDIES = Path(__file__).resolve().parent
 RECIPE = STUDIES.parent.parent / "data_specs/recipes/full.yaml"
@@ -91,7 +91,7 @@ class SleepingBlast(BlastSimulator):
     store: Path = Path()
     sleep: float = 0.0
 
-    def run(self, inputs: Columns, explosive: IntArray) -> BatchResult:
+    def run(self, inputs: Columns, explosive: IndexArray) -> BatchResult:
         """As many rows of the store, from a place that the inputs decide."""
         results = _stored(self.store)
         time.sleep(self.sleep * len(explosive))

@@ -9,15 +9,11 @@ the explosive.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from castblast.design.rule import (
-    BoolArray,
     FaultyRows,
-    FloatArray,
     InputColumns,
     as_columns,
     complete_columns,
@@ -31,25 +27,22 @@ from castblast.design.rule import (
 from castblast.design.variables import BURDEN_PARAMETER_SETS, INPUT_NAMES
 from castblast.errors import nearest_name
 from castblast.explosive.isentrope import Explosive, in_hole_velocity
+from castblast.types import FloatArray, IndexArray
 
 __all__ = [
-    "BoolArray",
     "FaultyRows",
     "InputColumns",
-    "IntArray",
     "design_fault_columns",
     "design_faults",
     "resolve_columns",
     "resolve_inputs",
 ]
 
-IntArray: TypeAlias = NDArray[np.integer]
-
 
 def resolve_columns(
     values: InputColumns,
     explosives: Sequence[Explosive],
-    explosive: IntArray,
+    explosive: IndexArray,
     parameter_set: str = "authors",
 ) -> dict[str, FloatArray]:
     """Complete the inputs of n blasts with all defaults and check the designs.
@@ -102,7 +95,7 @@ def resolve_inputs(
 
 
 def _rise_time(
-    diameter: FloatArray, explosives: Sequence[Explosive], explosive: IntArray
+    diameter: FloatArray, explosives: Sequence[Explosive], explosive: IndexArray
 ) -> FloatArray:
     """Time [s] in which the detonation passes one hole diameter [m].
 

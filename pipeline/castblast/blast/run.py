@@ -16,13 +16,13 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.blast.inputs import InputColumns, IntArray, resolve_columns, resolve_inputs
+from castblast.blast.inputs import InputColumns, resolve_columns, resolve_inputs
 from castblast.burden.batch import BurdenBatch, solve_burden_motions
 from castblast.burden.case import BurdenColumns, BurdenGeometry, BurdenParameters, BurdenResult
 from castblast.burden.motion import no_burden_motion, solve_burden_motion
 from castblast.design.variables import OUTPUT_NAMES
 from castblast.errors import Status
-from castblast.explosive.isentrope import Explosive, FloatArray
+from castblast.explosive.isentrope import Explosive
 from castblast.nearfield.case import (
     EndMode,
     Hole,
@@ -33,6 +33,7 @@ from castblast.nearfield.case import (
 )
 from castblast.nearfield.lockstep.batch import NearFieldBatch, solve_near_fields
 from castblast.nearfield.solver import NearFieldResult, solve_near_field
+from castblast.types import FloatArray, IndexArray
 
 _Value = TypeVar("_Value", float, FloatArray)
 #: Inputs that set up the near-field mesh: rows that share them are solved together.
@@ -154,7 +155,7 @@ def result_values(result: BlastResult) -> dict[str, float]:
 
 def run_blasts(
     explosives: Sequence[Explosive],
-    explosive: IntArray,
+    explosive: IndexArray,
     values: InputColumns,
     settings: BlastSettings = BlastSettings(),  # noqa: B008  (immutable)
 ) -> BlastBatch:

@@ -31,8 +31,9 @@ from castblast.burden.geometry import (
 )
 from castblast.burden.stemming import leakage_flux, stemming_acceleration
 from castblast.burden.venting import ATMOSPHERIC_PRESSURE, fracture_flux, gas_outflow
-from castblast.explosive.isentrope import Explosive, FloatArray, ProductIsentrope, gas_state
+from castblast.explosive.isentrope import Explosive, ProductIsentrope, gas_state
 from castblast.kernel import inline_kernel, kernel
+from castblast.types import FloatArray
 
 GRAVITY: Final = 9.80665
 

@@ -7,30 +7,17 @@ from math import pi
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from castblast.burden import balance as bal
-from castblast.burden.case import (
-    BurdenBatch,
-    BurdenColumns,
-    BurdenGeometry,
-    BurdenParameters,
-    IntArray,
-)
+from castblast.burden.case import BurdenBatch, BurdenColumns, BurdenGeometry, BurdenParameters
 from castblast.burden.geometry import breakout_width
 from castblast.burden.integrator import Path, integrate, make_path
 from castblast.burden.ledger import LEDGER_TOLERANCE, acceleration_end, summarise, write_history
 from castblast.burden.runge_kutta import Work, make_work
 from castblast.errors import Status
-from castblast.explosive.isentrope import (
-    TABLE_MARGIN,
-    Explosive,
-    FloatArray,
-    energy,
-    inside_table,
-    pressure,
-)
+from castblast.explosive.isentrope import TABLE_MARGIN, Explosive, energy, inside_table, pressure
 from castblast.kernel import kernel
+from castblast.types import BoolArray, FloatArray, IntArray
 
 __all__ = ["BurdenBatch", "BurdenColumns", "solve_burden_motions", "solve_with_histories"]
 
@@ -95,7 +82,7 @@ def solve_with_histories(
 
 
 def _empty_batch(n: int) -> BurdenBatch:
-    arrays: dict[str, NDArray[np.int64] | FloatArray] = {
+    arrays: dict[str, IntArray | FloatArray] = {
         name: np.full(n, np.nan) for name in BurdenBatch._fields
     }
     arrays["status"] = np.full(n, Status.BAD_INPUT.value, dtype=np.int64)
@@ -103,13 +90,13 @@ def _empty_batch(n: int) -> BurdenBatch:
     return BurdenBatch(**arrays)  # type: ignore[arg-type]
 
 
-def _plausible(columns: BurdenColumns) -> NDArray[np.bool_]:
+def _plausible(columns: BurdenColumns) -> BoolArray:
     """Rows, as bool array (n,), whose values are finite and of the right sign."""
     named = columns._asdict()
     may_be_zero = np.array([name in _MAY_BE_ZERO or name == "explosive" for name in named])
     values = np.array(list(named.values()), dtype=np.float64)
     right_sign = (values > 0.0) | ((values == 0.0) & may_be_zero[:, None])
-    plausible: NDArray[np.bool_] = np.all(np.isfinite(values) & right_sign, axis=0)
+    plausible: BoolArray = np.all(np.isfinite(values) & right_sign, axis=0)
     return plausible
 
 

@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from castblast.explosive.isentrope import FloatArray
-
-IntArray: TypeAlias = NDArray[np.int64]
+from castblast.types import FloatArray, IntArray
 
 
 class BurdenGeometry(NamedTuple):

@@ -10,7 +10,6 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from castblast.burden.balance import CORE_SIZE, STATE_SIZE, Balance, rates
 from castblast.burden.runge_kutta import (
@@ -28,8 +27,8 @@ from castblast.burden.runge_kutta import (
     take_step,
 )
 from castblast.errors import Status
-from castblast.explosive.isentrope import FloatArray
 from castblast.kernel import kernel, lean_kernel
+from castblast.types import BoolArray, FloatArray
 
 MAX_STEPS: Final = 6000
 #: A trial step with a greater error over the tolerance says nothing of events.
@@ -52,7 +51,7 @@ class Path(NamedTuple):
 
     times: FloatArray
     states: FloatArray
-    phases: NDArray[np.bool_]
+    phases: BoolArray
 
 
 @kernel

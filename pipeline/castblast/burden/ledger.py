@@ -25,8 +25,9 @@ from castblast.burden.geometry import pressurised_plane
 from castblast.burden.integrator import Path
 from castblast.burden.runge_kutta import REACHED_VELOCITY, Phase, Work, step_to_event, take_step
 from castblast.burden.venting import ATMOSPHERIC_PRESSURE
-from castblast.explosive.isentrope import FloatArray, energy, pressure
+from castblast.explosive.isentrope import energy, pressure
 from castblast.kernel import kernel
+from castblast.types import FloatArray
 
 #: A ledger that is open by more than this share of the gas energy fails the run.
 LEDGER_TOLERANCE: Final = 1e-6

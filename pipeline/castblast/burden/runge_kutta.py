@@ -27,8 +27,9 @@ from castblast.burden.balance import (
 from castblast.burden.dop853 import FIFTH_ORDER_ERROR, NODES, STAGES, THIRD_ORDER_ERROR, WEIGHTS
 from castblast.burden.stemming import push_margin
 from castblast.burden.venting import ATMOSPHERIC_PRESSURE, choke_margin
-from castblast.explosive.isentrope import FloatArray, gas_state
+from castblast.explosive.isentrope import gas_state
 from castblast.kernel import kernel, lean_kernel
+from castblast.types import FloatArray
 
 STAGE_COUNT: Final = 12
 RELATIVE_TOLERANCE: Final = 1e-9

@@ -12,8 +12,9 @@ from math import pi
 
 import numpy as np
 
-from castblast.design.rule import FaultyRows, FloatArray
+from castblast.design.rule import FaultyRows
 from castblast.design.variables import VARIABLES
+from castblast.types import FloatArray
 
 #: Exponent with which spacing and twice the burden blend into the width of the break-out plane;
 #: that of `castblast.burden.geometry`, which the kernels take.

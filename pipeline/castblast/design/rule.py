@@ -19,13 +19,11 @@ from functools import partial
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from castblast.design.variables import INPUTS, STEMMING_RATIO, VARIABLES
 from castblast.errors import SpecError, nearest_name
+from castblast.types import BoolArray, FloatArray
 
-FloatArray: TypeAlias = NDArray[np.float64]
-BoolArray: TypeAlias = NDArray[np.bool_]
 #: Input names to SI values: a column (n,), or one value for all rows.
 InputColumns: TypeAlias = Mapping[str, float | FloatArray]
 

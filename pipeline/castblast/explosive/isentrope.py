@@ -9,14 +9,13 @@ with the rock, late reaction, and any state off the isentrope.
 
 from __future__ import annotations
 
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from castblast.kernel import inline_kernel, kernel
-
-FloatArray: TypeAlias = NDArray[np.float64]
+from castblast.types import FloatArray
 
 # Gauss-Legendre nodes on (0, 1): energy between two points of the tabulated isentrope.
 _nodes, _weights = np.polynomial.legendre.leggauss(8)

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from castblast.explosive.isentrope import FloatArray, ProductIsentrope, jwl_pressure, pressure
+from castblast.explosive.isentrope import ProductIsentrope, jwl_pressure, pressure
 from castblast.kernel import kernel
-
-_BoolArray: TypeAlias = NDArray[np.bool_]
-_IntArray: TypeAlias = NDArray[np.int64]
+from castblast.types import BoolArray, FloatArray, IntArray
 
 
 class PackedIsentropes(NamedTuple):
@@ -29,9 +26,9 @@ class PackedIsentropes(NamedTuple):
         Its columns log_volume, log_pressure, log_slope, energy, filled up with zeros.
     """
 
-    tabulated: _BoolArray
+    tabulated: BoolArray
     constants: FloatArray
-    points: _IntArray
+    points: IntArray
     tables: FloatArray
 
 

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TypeAlias
-
 import numpy as np
-from numpy.typing import NDArray
 
 from castblast.explosive.checks import check_work
 from castblast.explosive.cj import energy_behind, touching_state
@@ -16,18 +13,12 @@ from castblast.explosive.finding import (
     judge_range,
     rejected,
 )
-from castblast.explosive.isentrope import (
-    FloatArray,
-    ProductIsentrope,
-    pressure,
-    tabulated_isentrope,
-)
+from castblast.explosive.isentrope import ProductIsentrope, pressure, tabulated_isentrope
+from castblast.types import BoolArray, FloatArray
 
 #: Pressure [Pa] down to which a table has to reach.
 TABLE_END_PRESSURE = 5e6
 SMALLEST_TABLE = 12
-
-_Mask: TypeAlias = NDArray[np.bool_]
 
 
 def check_table(
@@ -99,7 +90,7 @@ def _table_rows(volume: FloatArray, pressures: FloatArray) -> list[Finding]:
     return findings
 
 
-def _after_first(good: _Mask) -> _Mask:
+def _after_first(good: BoolArray) -> BoolArray:
     return np.concatenate(([True], good))
 
 

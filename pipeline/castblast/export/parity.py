@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from castblast.export.onnx.file import run_onnx_rows
 from castblast.export.source.answers import Answers, NotVerifiedError
@@ -20,7 +19,6 @@ from castblast.export.source.plain import Files
 from castblast.export.targets import TARGETS
 from castblast.network import (
     Bounds,
-    Floats,
     Network,
     Shell,
     density_score,
@@ -30,6 +28,7 @@ from castblast.network import (
     offending_inputs,
     prediction_bounds,
 )
+from castblast.types import FloatArray, IntArray
 
 #: Largest relative deviation allowed for a float64 export.
 TOLERANCE = 1e-12
@@ -170,7 +169,7 @@ def check_wrapped_parity(shell: Shell, model: bytes) -> ParityReport:
     return replace(compare_outputs(shell, "onnx", found), tool="ONNX")
 
 
-def _golden_rows(shell: Shell) -> tuple[Floats, NDArray[np.int64]]:
+def _golden_rows(shell: Shell) -> tuple[FloatArray, IntArray]:
     golden = shell.golden
     index = [explosive_index(shell, name) for name in golden.explosives]
     return golden.inputs, np.array(index, dtype=np.int64)
@@ -198,7 +197,7 @@ def compare_outputs(shell: Shell, target: str, found: Answers) -> ParityReport:
     )
 
 
-def _band_deviation(found: Bounds, truth: Bounds, size: Floats) -> float:
+def _band_deviation(found: Bounds, truth: Bounds, size: FloatArray) -> float:
     """Largest deviation of both ends, over the larger of end and size of the output.
 
     Infinite where only one side is unknown.

@@ -20,8 +20,9 @@ from castblast.errors import SpecError
 from castblast.export.source.answers import Answers
 from castblast.export.source.javascript import to_javascript
 from castblast.export.source.plain import Files, compact, render
-from castblast.export.source.runners import Index, run_js
-from castblast.network import Floats, Network
+from castblast.export.source.runners import run_js
+from castblast.network import Network
+from castblast.types import FloatArray, IntArray
 
 PAGE = "index.html"
 _FOLDER = Path(__file__).parent / "templates" / "web"
@@ -69,7 +70,9 @@ def to_web(network: Network, histories: Mapping[str, Any] | None = None) -> File
     return {PAGE: text}
 
 
-def run_web(network: Network, files: Files, numeric: Floats, index: Index) -> tuple[Answers, str]:
+def run_web(
+    network: Network, files: Files, numeric: FloatArray, index: IntArray
+) -> tuple[Answers, str]:
     """Take the model out of the page and run it in node."""
     text = files[PAGE].decode().split(_BEGIN)[1].split(_END)[0]
     found, tool = run_js(network, {"model.js": text.encode()}, numeric, index)

@@ -43,7 +43,7 @@ from castblast.network.parts import (
     OutputColumn,
 )
 from castblast.network.record import Network, Shell
-from castblast.network.terms import SCHEMA_VERSION, Activation, Floats, Transform
+from castblast.network.terms import SCHEMA_VERSION, Activation, Transform
 
 __all__ = [
     "BLAME",
@@ -56,7 +56,6 @@ __all__ = [
     "DerivedColumn",
     "DomainKind",
     "DomainViolation",
-    "Floats",
     "GoldenRows",
     "InputColumn",
     "Layer",

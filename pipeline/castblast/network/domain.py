@@ -6,11 +6,10 @@ from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from castblast.network.parts import Column
 from castblast.network.record import Shell
-from castblast.network.terms import Floats
+from castblast.types import BoolArray, FloatArray
 
 #: What refuses a row: range of one input, rule between inputs, joint density; or an input that the
 #: network cannot see was given.
@@ -27,19 +26,19 @@ class DomainViolation(NamedTuple):
     kind: DomainKind
 
 
-def scale_columns(values: Floats, columns: tuple[Column, ...]) -> Floats:
+def scale_columns(values: FloatArray, columns: tuple[Column, ...]) -> FloatArray:
     """Transform and standardise SI values (n, len(columns)); what cannot be logged gives NaN."""
     logged = np.array([column.transform == "log" for column in columns], dtype=bool)
     mean = np.array([column.mean for column in columns])
     scale = np.array([column.scale for column in columns])
-    x: Floats = values.astype(np.float64)
+    x: FloatArray = values.astype(np.float64)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         x[:, logged] = np.log(x[:, logged])
-        scaled: Floats = (x - mean) / scale
+        scaled: FloatArray = (x - mean) / scale
     return scaled
 
 
-def density_score(shell: Shell, numeric: Floats) -> Floats:
+def density_score(shell: Shell, numeric: FloatArray) -> FloatArray:
     """Score rows of SI inputs (n, k) against the joint density of the training rows.
 
     Returns
@@ -54,7 +53,7 @@ def density_score(shell: Shell, numeric: Floats) -> Floats:
     return np.asarray(np.min(distances, axis=0) / shell.density.threshold)
 
 
-def density_reliefs(shell: Shell, numeric: Floats) -> Floats:
+def density_reliefs(shell: Shell, numeric: FloatArray) -> FloatArray:
     """How far the score of each row would fall if one input were free, (n, k).
 
     About the nearest centre c with P = whitening' whitening and d = z - c, letting input i go to
@@ -71,11 +70,11 @@ def density_reliefs(shell: Shell, numeric: Floats) -> Floats:
     return np.asarray(slopes**2 / np.sum(whitening**2, axis=1) / density.threshold)
 
 
-def keeps_ranges_and_rules(shell: Shell, numeric: Floats) -> NDArray[np.bool_]:
+def keeps_ranges_and_rules(shell: Shell, numeric: FloatArray) -> BoolArray:
     """Tell for each row of SI inputs (n, k) whether ranges and rules hold; NaN breaks them."""
     lower = np.array([column.lower for column in shell.inputs])
     upper = np.array([column.upper for column in shell.inputs])
-    inside: NDArray[np.bool_] = np.all((numeric >= lower) & (numeric <= upper), axis=1)
+    inside: BoolArray = np.all((numeric >= lower) & (numeric <= upper), axis=1)
     row = dict(zip(shell.input_names, numeric.T, strict=True))
     for rule in shell.constraints:
         with np.errstate(invalid="ignore"):
@@ -83,7 +82,7 @@ def keeps_ranges_and_rules(shell: Shell, numeric: Floats) -> NDArray[np.bool_]:
     return inside
 
 
-def in_domain(shell: Shell, numeric: Floats, score: Floats | None = None) -> NDArray[np.bool_]:
+def in_domain(shell: Shell, numeric: FloatArray, score: FloatArray | None = None) -> BoolArray:
     """Tell for each row of SI inputs (n, k) whether it lies in the domain; NaN does not.
 
     `score` is that of `density_score`, where it is known already.
@@ -94,11 +93,11 @@ def in_domain(shell: Shell, numeric: Floats, score: Floats | None = None) -> NDA
     return inside
 
 
-def offending_inputs(shell: Shell, numeric: Floats) -> NDArray[np.bool_]:
+def offending_inputs(shell: Shell, numeric: FloatArray) -> BoolArray:
     """Inputs that `domain_violations` names, for rows of SI inputs (n, k): (n, k) bool."""
     lower = np.array([column.lower for column in shell.inputs])
     upper = np.array([column.upper for column in shell.inputs])
-    named: NDArray[np.bool_] = ~((numeric >= lower) & (numeric <= upper))
+    named: BoolArray = ~((numeric >= lower) & (numeric <= upper))
     columns = dict(zip(shell.input_names, numeric.T, strict=True))
     for rule in shell.constraints:
         with np.errstate(invalid="ignore"):

@@ -6,24 +6,24 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from castblast.bands import prediction_factor
 from castblast.errors import SpecError, nearest_name
 from castblast.network.domain import density_score, in_domain, scale_columns
 from castblast.network.parts import Layer
 from castblast.network.record import Network, Shell
-from castblast.network.terms import Floats
+from castblast.types import BoolArray, FloatArray, IntArray
 
 
-def _logistic(x: Floats) -> Floats:
+def _logistic(x: FloatArray) -> FloatArray:
     # Two forms, so that neither overflows.
     small = np.exp(-np.abs(x))
-    result: Floats = np.where(x >= 0.0, 1.0, small) / (1.0 + small)
+    result: FloatArray = np.where(x >= 0.0, 1.0, small) / (1.0 + small)
     return result
 
 
-_ACTIVATIONS: dict[str, Callable[[Floats], Floats]] = {
+_ACTIVATIONS: dict[str, Callable[[FloatArray], FloatArray]] = {
     "identity": lambda x: x,
     "tanh": np.tanh,
     "relu": lambda x: np.maximum(x, 0.0),
@@ -35,8 +35,8 @@ _ACTIVATIONS: dict[str, Callable[[Floats], Floats]] = {
 class Bounds(NamedTuple):
     """Ends of a band of n rows, (n, m) [SI]."""
 
-    lower: Floats
-    upper: Floats
+    lower: FloatArray
+    upper: FloatArray
 
 
 class RowPredictions(NamedTuple):
@@ -56,11 +56,11 @@ class RowPredictions(NamedTuple):
         Box, rules and density together.
     """
 
-    values: Floats
+    values: FloatArray
     prediction: Bounds
     network: Bounds
-    score: Floats
-    inside: NDArray[np.bool_]
+    score: FloatArray
+    inside: BoolArray
 
 
 def explosive_index(shell: Shell, name: str) -> int:
@@ -79,7 +79,7 @@ def explosive_index(shell: Shell, name: str) -> int:
     return shell.explosives.index(name)
 
 
-def scaled_inputs(shell: Shell, numeric: Floats, index: NDArray[np.int64]) -> Floats:
+def scaled_inputs(shell: Shell, numeric: FloatArray, index: IntArray) -> FloatArray:
     """What enters the first layer: scaled inputs, scaled derived columns, codes; (n, k + d + c)."""
     parts = [scale_columns(numeric, shell.inputs)]
     if shell.derived:
@@ -89,7 +89,7 @@ def scaled_inputs(shell: Shell, numeric: Floats, index: NDArray[np.int64]) -> Fl
     return np.concatenate([*parts, shell.codes[index]], axis=1)
 
 
-def derived_matrix(shell: Shell) -> Floats:
+def derived_matrix(shell: Shell) -> FloatArray:
     """Coefficients (k, d): numeric inputs @ matrix = derived columns, both SI."""
     return np.array(
         [
@@ -100,7 +100,7 @@ def derived_matrix(shell: Shell) -> Floats:
     )
 
 
-def evaluate_rows(network: Network, numeric: Floats, index: NDArray[np.int64]) -> Floats:
+def evaluate_rows(network: Network, numeric: FloatArray, index: IntArray) -> FloatArray:
     """Evaluate rows of SI inputs.
 
     Parameters
@@ -117,7 +117,7 @@ def evaluate_rows(network: Network, numeric: Floats, index: NDArray[np.int64]) -
     return _run(network, network.layers, scaled_inputs(network, numeric, index))
 
 
-def run_layers(layers: Sequence[Layer], x: Floats) -> Floats:
+def run_layers(layers: Sequence[Layer], x: FloatArray) -> FloatArray:
     """Rows (n, k) that are scaled already through a chain of layers."""
     with np.errstate(invalid="ignore", over="ignore"):
         for layer in layers:
@@ -125,7 +125,7 @@ def run_layers(layers: Sequence[Layer], x: Floats) -> Floats:
     return x
 
 
-def _run(network: Network, layers: Sequence[Layer], x: Floats) -> Floats:
+def _run(network: Network, layers: Sequence[Layer], x: FloatArray) -> FloatArray:
     """Scaled rows through a chain of layers to outputs in SI."""
     x = run_layers(layers, x)
     with np.errstate(invalid="ignore", over="ignore"):
@@ -136,7 +136,7 @@ def _run(network: Network, layers: Sequence[Layer], x: Floats) -> Floats:
     return x
 
 
-def member_spread(network: Network, numeric: Floats, index: NDArray[np.int64]) -> Floats:
+def member_spread(network: Network, numeric: FloatArray, index: IntArray) -> FloatArray:
     """Relative standard deviation over the network and its members, (n, m).
 
     Of the outputs of all, over the absolute value of the network itself; NaN without members.
@@ -150,7 +150,7 @@ def member_spread(network: Network, numeric: Floats, index: NDArray[np.int64]) -
         return np.asarray(np.std(answers, axis=0, ddof=1) / np.abs(answers[0]))
 
 
-def predict_rows(network: Network, numeric: Floats, index: NDArray[np.int64]) -> RowPredictions:
+def predict_rows(network: Network, numeric: FloatArray, index: IntArray) -> RowPredictions:
     """Evaluate rows of SI inputs with bands and domain; parameters as `evaluate_rows`."""
     values = evaluate_rows(network, numeric, index)
     score = density_score(network, numeric)
@@ -163,14 +163,14 @@ def predict_rows(network: Network, numeric: Floats, index: NDArray[np.int64]) ->
     )
 
 
-def network_bounds(shell: Shell, values: Floats) -> Bounds:
+def network_bounds(shell: Shell, values: FloatArray) -> Bounds:
     """Ends of the 95 % bands of a network about its outputs (n, m) in SI."""
     half = np.abs(values) * np.array([column.relative_band for column in shell.outputs])
     with np.errstate(invalid="ignore"):
         return Bounds(values - half, values + half)
 
 
-def prediction_bounds(shell: Shell, values: Floats) -> Bounds:
+def prediction_bounds(shell: Shell, values: FloatArray) -> Bounds:
     """Ends of the prediction bands about outputs (n, m) in SI, the error of the network included.
 
     NaN for outputs without a prior; values below zero have their ends in order.
@@ -191,7 +191,7 @@ def prediction_factors(shell: Shell) -> list[tuple[float, float]]:
 
 def evaluate(
     network: Network, values: Mapping[str, ArrayLike], explosive: str | Sequence[str]
-) -> dict[str, Floats]:
+) -> dict[str, FloatArray]:
     """Evaluate a network on named SI inputs.
 
     Parameters

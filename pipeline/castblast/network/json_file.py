@@ -1,6 +1,6 @@
 """`Network` to JSON and back: the interchange form that every other export starts from.
 
-Floats are written with `repr`, the shortest text that reads back to the same bits, so a round
+FloatArray are written with `repr`, the shortest text that reads back to the same bits, so a round
 trip is exact. Keys come in a fixed order and no time, host or path is added: equal networks give
 equal bytes.
 """
@@ -24,13 +24,13 @@ from castblast.network import (
     Constraint,
     DensityScore,
     DerivedColumn,
-    Floats,
     GoldenRows,
     InputColumn,
     Layer,
     Network,
     OutputColumn,
 )
+from castblast.types import FloatArray
 
 _FORMAT = "castblast network"
 #: Most bytes of a network.json; a million weights have less.
@@ -218,7 +218,7 @@ def _texts(value: object, where: str) -> tuple[str, ...]:
     return tuple(_list(value, where))
 
 
-def _floats(nested: object, where: str) -> Floats:
+def _floats(nested: object, where: str) -> FloatArray:
     """Lists of numbers as an array; texts of numbers are none."""
     needed = "lists of numbers, all of one length, are needed"
     try:

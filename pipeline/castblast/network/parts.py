@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from castblast.design.variables import VARIABLES
-from castblast.network.terms import Activation, Floats, Transform
+from castblast.network.terms import Activation, Transform
+from castblast.types import FloatArray
 
 
 @dataclass(frozen=True)
@@ -71,8 +72,8 @@ class OutputColumn(Column):
 class Layer:
     """Dense layer: activation(x @ weights + biases), weights (n_in, n_out), biases (n_out,)."""
 
-    weights: Floats
-    biases: Floats
+    weights: FloatArray
+    biases: FloatArray
     activation: Activation
 
 
@@ -114,13 +115,13 @@ class DensityScore:
         Share of rows of the training distribution that score at most 1.
     """
 
-    centres: Floats
-    whitening: Floats
-    offsets: Floats
+    centres: FloatArray
+    whitening: FloatArray
+    offsets: FloatArray
     threshold: float
     level: float
 
-    def distances(self, scaled: Floats) -> Floats:
+    def distances(self, scaled: FloatArray) -> FloatArray:
         """Squared distance and offset of every centre for scaled inputs (n, k): (c, n)."""
         distances = np.empty((len(self.centres), len(scaled)))
         with np.errstate(invalid="ignore", over="ignore"):
@@ -141,9 +142,9 @@ class GoldenRows:
     outputs : (n, m) SI
     """
 
-    inputs: Floats
+    inputs: FloatArray
     explosives: tuple[str, ...]
-    outputs: Floats
+    outputs: FloatArray
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -174,7 +175,7 @@ class ShellParts:
 
     inputs: tuple[InputColumn, ...]
     explosives: tuple[str, ...]
-    codes: Floats
+    codes: FloatArray
     outputs: tuple[OutputColumn, ...]
     constraints: tuple[Constraint, ...]
     golden: GoldenRows

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Literal, TypeAlias
+from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
-Floats: TypeAlias = NDArray[np.float64]
 Transform = Literal["linear", "log"]
 Activation = Literal["identity", "tanh", "relu", "logistic", "silu"]
 

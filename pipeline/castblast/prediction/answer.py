@@ -11,12 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from castblast.bands import band_document
 from castblast.design.rule import require_possible
 from castblast.disk.resources import SHIPPED_NETWORKS, is_bare_name, resource
-from castblast.network import Floats, Network, RowPredictions, member_spread
+from castblast.network import Network, RowPredictions, member_spread
 from castblast.network.json_file import read_network
 from castblast.prediction.columns import (
     ColumnPredictions,
@@ -25,6 +24,7 @@ from castblast.prediction.columns import (
     predict_columns,
     row_violations,
 )
+from castblast.types import FloatArray, IntArray
 
 
 def load_network(path: Path | None = None) -> Network:
@@ -84,7 +84,7 @@ def predict(
 
 
 def answer_document(
-    answers: ColumnPredictions, explosive: NDArray[np.int64], network: Network
+    answers: ColumnPredictions, explosive: IntArray, network: Network
 ) -> Iterator[dict[str, Any]]:
     """Make the document of every row, see `predict`; rows that are refused have no meaning."""
     names = list(answers.designs.inputs)
@@ -127,7 +127,7 @@ def _network_band(network: Network, rows: RowPredictions, row: int) -> dict[str,
     }
 
 
-def _named(network: Network, values: Floats) -> dict[str, float]:
+def _named(network: Network, values: FloatArray) -> dict[str, float]:
     """Values of the outputs by their names."""
     return dict(zip(network.output_names, values.tolist(), strict=True))
 

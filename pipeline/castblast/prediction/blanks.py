@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from castblast.design.rule import COMPLETED, FaultyRows
 from castblast.design.variables import VARIABLES
-from castblast.network import Bounds, Floats, Network, RowPredictions
+from castblast.network import Bounds, Network, RowPredictions
 from castblast.prediction.columns import (
     ColumnPredictions,
     NetworkDesigns,
@@ -23,10 +23,11 @@ from castblast.prediction.columns import (
     held_inputs,
     predict_columns,
 )
+from castblast.types import BoolArray, FloatArray
 
 
 def predict_with_blanks(
-    values: Mapping[str, Floats], explosive: NDArray[np.integer], network: Network
+    values: Mapping[str, FloatArray], explosive: NDArray[np.integer], network: Network
 ) -> ColumnPredictions:
     """Predict columns of designs in which NaN stands for a cell that is not given.
 
@@ -75,16 +76,16 @@ def _joined(parts: list[_Part], count: int) -> ColumnPredictions:
             whole[rows] = piece
         return whole
 
-    def floats(take: Callable[[ColumnPredictions], Floats]) -> Floats:
+    def floats(take: Callable[[ColumnPredictions], FloatArray]) -> FloatArray:
         return column(take).astype(np.float64, copy=False)
 
-    def flags(take: Callable[[ColumnPredictions], NDArray[np.bool_]]) -> NDArray[np.bool_]:
+    def flags(take: Callable[[ColumnPredictions], BoolArray]) -> BoolArray:
         return column(take).astype(np.bool_, copy=False)
 
     def bounds(take: Callable[[ColumnPredictions], Bounds]) -> Bounds:
         return Bounds(floats(lambda a: take(a).lower), floats(lambda a: take(a).upper))
 
-    def input_column(name: str) -> Floats:
+    def input_column(name: str) -> FloatArray:
         return floats(lambda answers: answers.designs.inputs[name])
 
     faults = [
@@ -112,7 +113,7 @@ def _joined(parts: list[_Part], count: int) -> ColumnPredictions:
     )
 
 
-def _spread(part: _Part, rows: NDArray[np.bool_], count: int) -> NDArray[np.bool_]:
+def _spread(part: _Part, rows: BoolArray, count: int) -> BoolArray:
     whole = np.zeros(count, dtype=bool)
     whole[part.rows] = rows
     return whole

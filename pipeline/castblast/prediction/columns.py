@@ -31,7 +31,6 @@ from castblast.design.variables import INPUT_NAMES, VARIABLES
 from castblast.network import (
     Bounds,
     DomainViolation,
-    Floats,
     Network,
     RowPredictions,
     Shell,
@@ -42,6 +41,7 @@ from castblast.network import (
     predict_rows,
 )
 from castblast.specs.catalogue import resolve_explosive
+from castblast.types import BoolArray, FloatArray, IntArray
 
 #: Inputs that share the hole: a network that cannot see how they do so answers for another charge.
 _CHARGE = ("stemming_length", "charge_length")
@@ -66,7 +66,7 @@ class UnseenInput(NamedTuple):
     """
 
     name: str
-    rows: NDArray[np.bool_]
+    rows: BoolArray
     say: Callable[[int], str]
 
 
@@ -83,7 +83,7 @@ class NetworkDesigns(NamedTuple):
         What the network cannot see though the design has it, without what is refused.
     """
 
-    inputs: dict[str, Floats]
+    inputs: dict[str, FloatArray]
     faults: list[FaultyRows]
     unseen: list[UnseenInput]
 
@@ -104,7 +104,7 @@ class ColumnPredictions(NamedTuple):
 
     designs: NetworkDesigns
     rows: RowPredictions
-    refused: NDArray[np.bool_]
+    refused: BoolArray
     domain: NDArray[np.str_]
 
 
@@ -159,10 +159,10 @@ def explosive_position(network: Shell, text: str) -> int:
     return explosive_index(network, resolve_explosive(text, network.explosives) or text)
 
 
-def _without(rows: RowPredictions, refused: NDArray[np.bool_]) -> RowPredictions:
+def _without(rows: RowPredictions, refused: BoolArray) -> RowPredictions:
     """Answers with NaN in every number of the refused rows."""
 
-    def blank(part: Floats) -> Floats:
+    def blank(part: FloatArray) -> FloatArray:
         return np.where(refused[:, None], np.nan, part)
 
     return RowPredictions(
@@ -181,20 +181,20 @@ def network_designs(values: InputColumns, count: int, network: Shell) -> Network
 
 def _completed(
     values: InputColumns, count: int, network: Shell
-) -> tuple[NetworkDesigns, dict[str, Floats]]:
+) -> tuple[NetworkDesigns, dict[str, FloatArray]]:
     """Designs as a network takes them, and all inputs that they have."""
     require_none(name_faults(values))
     given = as_columns(values, count)
     held = held_inputs(network)
     # Where training held an input at another value than the default, that is what is answered for.
-    known: dict[str, float | Floats] = {n: v for n, v in held.items() if n not in COMPLETED}
+    known: dict[str, float | FloatArray] = {n: v for n, v in held.items() if n not in COMPLETED}
     known |= given
     faults = fault_columns(known, count)
     full = complete_columns(known, count)
     missing = [name for name in network.input_names if name not in full]
     require_none([f"{name}: must be given, it has no default" for name in missing])
     inputs = {name: full[name] for name in network.input_names}
-    trained: dict[str, float | Floats] = {**held, **inputs}
+    trained: dict[str, float | FloatArray] = {**held, **inputs}
     unseen = _unseen({*given, *COMPLETED}, full, trained, count)
     faulty = _any_row(faults, count)
     faults += [
@@ -206,11 +206,11 @@ def _completed(
 @np.errstate(all="ignore")  # what is no number is refused by its bounds
 def _outgrown(
     network: Network,
-    numeric: Floats,
-    index: NDArray[np.int64],
+    numeric: FloatArray,
+    index: IntArray,
     rows: RowPredictions,
     designs: NetworkDesigns,
-    full: Mapping[str, Floats],
+    full: Mapping[str, FloatArray],
 ) -> list[FaultyRows]:
     """Designs whose hole, as predicted, expands as wide as their burden or spacing.
 
@@ -255,7 +255,7 @@ def row_violations(answers: ColumnPredictions, row: int, network: Shell) -> list
     return domain_violations(network, design) + unseen
 
 
-def _any_row(faults: Sequence[FaultyRows], count: int) -> NDArray[np.bool_]:
+def _any_row(faults: Sequence[FaultyRows], count: int) -> BoolArray:
     rows = np.zeros(count, dtype=bool)
     for fault in faults:
         rows |= fault.rows
@@ -263,7 +263,10 @@ def _any_row(faults: Sequence[FaultyRows], count: int) -> NDArray[np.bool_]:
 
 
 def _unseen(
-    names: set[str], full: Mapping[str, Floats], trained: Mapping[str, float | Floats], count: int
+    names: set[str],
+    full: Mapping[str, FloatArray],
+    trained: Mapping[str, float | FloatArray],
+    count: int,
 ) -> list[UnseenInput]:
     """Inputs of `names` whose values are not those that go with the training inputs `trained`."""
     expected = complete_columns(trained, count)
@@ -287,8 +290,8 @@ def _sayer(
     say: Callable[..., str],
     name: str,
     words: str,
-    full: Mapping[str, Floats],
-    expected: Floats | None,
+    full: Mapping[str, FloatArray],
+    expected: FloatArray | None,
 ) -> Callable[[int], str]:
     def line(row: int) -> str:
         at = None if expected is None else VARIABLES[name].show(float(expected[row]))

@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 from matplotlib.ticker import LogLocator
-from numpy.typing import NDArray
 
 from castblast.bands import BAND_TITLE
 from castblast.report.style import CYCLE, in_style, new_figure, save_figure
+from castblast.types import FloatArray
 
 
 @dataclass(frozen=True)
@@ -28,12 +27,12 @@ class VelocityCurve:
     """
 
     label: str
-    burden: NDArray[np.float64]
-    velocity: NDArray[np.float64]
-    lower: NDArray[np.float64]
-    upper: NDArray[np.float64]
-    simulated_burden: NDArray[np.float64]
-    simulated_velocity: NDArray[np.float64]
+    burden: FloatArray
+    velocity: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    simulated_burden: FloatArray
+    simulated_velocity: FloatArray
 
 
 @in_style

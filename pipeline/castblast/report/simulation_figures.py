@@ -6,9 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from castblast.bands import BAND_TITLE, BASIS, prediction_band, show_band, show_value
 from castblast.report.style import (
     BLUE,
@@ -22,30 +19,31 @@ from castblast.report.style import (
     new_figure,
     save_figure,
 )
+from castblast.types import FloatArray
 
 
 class NearFieldHistory(Protocol):
     """The histories of a near-field run that are drawn."""
 
     @property
-    def history_time(self) -> NDArray[np.float64]: ...  # noqa: D102
+    def history_time(self) -> FloatArray: ...  # noqa: D102
     @property
-    def history_pressure(self) -> NDArray[np.float64]: ...  # noqa: D102
+    def history_pressure(self) -> FloatArray: ...  # noqa: D102
     @property
-    def history_radius(self) -> NDArray[np.float64]: ...  # noqa: D102
+    def history_radius(self) -> FloatArray: ...  # noqa: D102
 
 
 class BurdenHistory(Protocol):
     """The histories of a burden-motion run that are drawn."""
 
     @property
-    def history_time(self) -> NDArray[np.float64]: ...  # noqa: D102
+    def history_time(self) -> FloatArray: ...  # noqa: D102
     @property
-    def history_pressure(self) -> NDArray[np.float64]: ...  # noqa: D102
+    def history_pressure(self) -> FloatArray: ...  # noqa: D102
     @property
-    def history_velocity(self) -> NDArray[np.float64]: ...  # noqa: D102
+    def history_velocity(self) -> FloatArray: ...  # noqa: D102
     @property
-    def history_displacement(self) -> NDArray[np.float64]: ...  # noqa: D102
+    def history_displacement(self) -> FloatArray: ...  # noqa: D102
 
 
 _LEDGER = (

@@ -16,11 +16,11 @@ import numpy as np
 from castblast.errors import SpecError
 from castblast.jobs import available_cores
 from castblast.muckpile.balls.contact import ContactLaw, damped_step_factor
-from castblast.muckpile.balls.particles import FloatArray
 from castblast.muckpile.bench.sizes import Sizes, mean_of_power
 from castblast.scene.memory import require_memory
 from castblast.specs.bench.balls.spec import MOST_BALLS
 from castblast.specs.bench.bench import BenchSpec
+from castblast.types import FloatArray
 
 MOST_STEPS = 200_000_000
 MOST_FRAMES = 10_000

@@ -11,12 +11,12 @@ import numpy as np
 from castblast.design.hole import charge_length
 from castblast.design.rule import complete_columns
 from castblast.errors import SpecError
-from castblast.muckpile.balls.particles import FloatArray, IntArray
 from castblast.muckpile.bench.geometry import Bench, assign_blocks, block_centres, block_velocities
 from castblast.muckpile.bench.timing import firing_front_azimuth, nearest_holes, scatter_delays
 from castblast.specs.bench.bench import BenchSpec
 from castblast.specs.bench.holes import Holes, blocks_of_holes, read_holes
 from castblast.specs.explosive import load_explosive
+from castblast.types import FloatArray, IntArray
 
 #: Neighbours of a hole, over the larger of burden and spacing: those beside it and across.
 _NEIGHBOURS = 1.5

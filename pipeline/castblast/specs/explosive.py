@@ -28,7 +28,6 @@ from castblast.explosive.cj import (
 from castblast.explosive.finding import Finding
 from castblast.explosive.isentrope import (
     Explosive,
-    FloatArray,
     ProductIsentrope,
     jwl_isentrope,
     tabulated_isentrope,
@@ -39,6 +38,7 @@ from castblast.names import shortened
 from castblast.specs.catalogue import find_explosive
 from castblast.specs.loading import Label, Spec, load_spec
 from castblast.specs.quantity import QuantityError, QuantityIn, convert
+from castblast.types import FloatArray
 
 
 def _read_table(value: object) -> tuple[tuple[float, ...], ...]:

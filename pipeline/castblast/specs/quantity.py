@@ -11,12 +11,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from castblast.design.variables import VARIABLES, Variable
 from castblast.errors import SpecError, nearest_name
 from castblast.names import shortened
 from castblast.specs.units import QuantityError, convert
+from castblast.types import BoolArray, FloatArray
 
 if TYPE_CHECKING:
     from pydantic import GetCoreSchemaHandler
@@ -45,7 +46,7 @@ def convert_variable(name: str, value: object) -> float:
     return VariableIn(name).check(convert(value, VARIABLES[name].unit))
 
 
-def _within(numbers: ArrayLike, lower: float, upper: float) -> NDArray[np.bool_]:
+def _within(numbers: ArrayLike, lower: float, upper: float) -> BoolArray:
     """Compare with a rounding margin: 60 deg must pass a bound of 60 deg; NaN does not pass."""
     values = np.asarray(numbers, dtype=np.float64)
     return (lower - 1e-12 * abs(lower) <= values) & (values <= upper + 1e-12 * abs(upper))
@@ -134,7 +135,7 @@ class QuantityIn:
             return number
         raise QuantityError(message + (f"; {self.hint}" if self.hint else ""))
 
-    def within(self, numbers: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def within(self, numbers: FloatArray) -> BoolArray:
         """Which of many numbers in `unit` are allowed; NaN is not."""
         return (numbers > self.above) & _within(numbers, self.lower, self.upper)
 
@@ -181,7 +182,7 @@ class VariableIn:
         message = f"implausible ({variable.show(number)}); allowed: {allowed(variable)}"
         raise QuantityError(message)
 
-    def within(self, numbers: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def within(self, numbers: FloatArray) -> BoolArray:
         """Which of many numbers [SI] are plausible; NaN is not."""
         variable = VARIABLES[self.name]
         return _within(numbers, variable.lower, variable.upper)

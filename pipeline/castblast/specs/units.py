@@ -14,11 +14,9 @@ from contextlib import contextmanager
 from functools import cache
 from typing import Any, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from castblast.errors import nearest_name
 from castblast.names import shortened
+from castblast.types import FloatArray
 
 _PREFIXES = (
     "nano- = 1e-9 = n-",
@@ -270,7 +268,7 @@ def _split(value: float | str, unit: str) -> tuple[float, str]:
     return float(match[1]), match[2]
 
 
-_Numbers = TypeVar("_Numbers", float, NDArray[np.float64])
+_Numbers = TypeVar("_Numbers", float, FloatArray)
 
 
 def scaled(number: _Numbers, factor: float) -> _Numbers:

@@ -13,19 +13,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from castblast.design.rule import FaultyRows
 from castblast.design.variables import INPUT_NAMES, VARIABLES
 from castblast.errors import SpecError
 from castblast.names import cell_text
-from castblast.network import Floats, Network, offending_inputs
+from castblast.network import Network, offending_inputs
 from castblast.prediction.answer import answer_document, load_network
 from castblast.prediction.blanks import predict_with_blanks
 from castblast.prediction.columns import ColumnPredictions, explosive_position
 from castblast.specs.quantity import VariableIn
 from castblast.specs.tables.table import ID_HEADS, Form, Table, read_table
 from castblast.specs.tables.text import NUMBER
+from castblast.types import FloatArray, IntArray
 
 _FORM = Form(
     columns={name: VariableIn(name) for name in INPUT_NAMES},
@@ -53,7 +53,7 @@ class PredictionTable:
 
     table: Table
     network: Network
-    explosive: NDArray[np.int64]
+    explosive: IntArray
     answers: ColumnPredictions
 
     @cached_property
@@ -113,7 +113,7 @@ def predict_csv(
     return PredictionTable(table, model, index, answers)
 
 
-def _explosives(table: Table, network: Network, default: str) -> NDArray[np.int64]:
+def _explosives(table: Table, network: Network, default: str) -> IntArray:
     """Positions of the explosives of all rows."""
     written = table.text.get("explosive")
     if written is None:
@@ -205,12 +205,12 @@ def _lines(found: PredictionTable) -> Iterator[str]:
             yield f"{label}{names[kind]},{form % tuple(row)},{words}"
 
 
-def _shown(values: Floats, names: tuple[str, ...]) -> Floats:
+def _shown(values: FloatArray, names: tuple[str, ...]) -> FloatArray:
     """SI values (n, m) in the units that people read."""
     return np.asarray(values * np.array([VARIABLES[name].display_factor for name in names]))
 
 
-def _bands(found: PredictionTable) -> Floats:
+def _bands(found: PredictionTable) -> FloatArray:
     """Lower and upper ends of all outputs side by side (n, 2 m), in the units that people read."""
     names = found.network.output_names
     low, high = (_shown(end, names) for end in found.answers.rows.prediction)

@@ -20,8 +20,8 @@ import numpy as np
 from castblast.dataset.file.schema import flag_names
 from castblast.design.variables import VARIABLES
 from castblast.errors import DatasetError
-from castblast.network import Floats
 from castblast.surrogate.fitting.features import varying_inputs
+from castblast.types import FloatArray
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -125,7 +125,7 @@ def fit_history_modes(dataset: xr.Dataset) -> dict[str, Any]:
     }
 
 
-def _common_time(dataset: xr.Dataset, good: Any) -> tuple[Floats, Floats]:
+def _common_time(dataset: xr.Dataset, good: Any) -> tuple[FloatArray, FloatArray]:
     """Dimensionless times (p,), from 1 on, and ln pressure there (n, p).
 
     The rise is straight and the rest smooth, so only points after the rise are interpolated, by
@@ -150,7 +150,9 @@ def _common_time(dataset: xr.Dataset, good: Any) -> tuple[Floats, Floats]:
     return times, curves
 
 
-def _principal_components(curves: Floats, rows: Any) -> tuple[tuple[Floats, Floats], Floats]:
+def _principal_components(
+    curves: FloatArray, rows: Any
+) -> tuple[tuple[FloatArray, FloatArray], FloatArray]:
     """Mean (p,) and modes (m, p) of some rows, and the scores (n, m) of all."""
     from sklearn.decomposition import PCA
 
@@ -158,7 +160,7 @@ def _principal_components(curves: Floats, rows: Any) -> tuple[tuple[Floats, Floa
     return (pca.mean_, pca.components_), np.asarray(pca.transform(curves))
 
 
-def _energy_shares(dataset: xr.Dataset, good: Any) -> Floats:
+def _energy_shares(dataset: xr.Dataset, good: Any) -> FloatArray:
     """Parts of `_ENERGY` over the energy of the explosive, (n, parts)."""
     kind = dataset["explosive"].to_numpy()[good].astype(int)
     density = dataset["explosive_total_energy"].to_numpy()[kind]
@@ -170,7 +172,7 @@ def _energy_shares(dataset: xr.Dataset, good: Any) -> Floats:
     return np.column_stack(parts)
 
 
-def _scaling(name: str, values: Floats) -> dict[str, Any]:
+def _scaling(name: str, values: FloatArray) -> dict[str, Any]:
     shown = np.log(values) if _LOGGED[name] else values
     return {
         "name": name,
@@ -183,7 +185,7 @@ def _scaling(name: str, values: Floats) -> dict[str, Any]:
     }
 
 
-def _polynomial(columns: list[dict[str, Any]], numeric: Floats) -> tuple[Floats, Any]:
+def _polynomial(columns: list[dict[str, Any]], numeric: FloatArray) -> tuple[FloatArray, Any]:
     """Terms (n, k) of the highest degree that stays small, and their powers (k, inputs)."""
     from sklearn.preprocessing import PolynomialFeatures
 
@@ -201,7 +203,7 @@ def _polynomial(columns: list[dict[str, Any]], numeric: Floats) -> tuple[Floats,
     return terms, features.powers_
 
 
-def _fit(terms: Floats, targets: Floats) -> Floats:
+def _fit(terms: FloatArray, targets: FloatArray) -> FloatArray:
     """Coefficients (k, t) by ridge regression; the constant term is free, so shares sum to 1."""
     from sklearn.linear_model import Ridge
 
@@ -209,13 +211,13 @@ def _fit(terms: Floats, targets: Floats) -> Floats:
     return np.vstack([model.intercept_, model.coef_.T])
 
 
-def _conformal(off: Floats) -> Floats:
+def _conformal(off: FloatArray) -> FloatArray:
     """Half band per column (p,): the order statistic that covers a new row at `_LEVEL`."""
     rank = min(ceil(_LEVEL * (len(off) + 1)), len(off)) - 1
     return np.asarray(np.sort(off, axis=0)[rank])
 
 
-def _rounded(values: Floats) -> Any:
+def _rounded(values: FloatArray) -> Any:
     """Nested lists of numbers of `_DIGITS` significant digits."""
     if values.ndim > 1:
         return [_rounded(row) for row in values]

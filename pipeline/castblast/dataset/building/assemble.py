@@ -24,9 +24,10 @@ from castblast.dataset.file.schema import (
 )
 from castblast.dataset.file.store import BLOCK_ROWS
 from castblast.dataset.rows.design import Design
-from castblast.dataset.rows.simulation import BatchResult, FloatArray
+from castblast.dataset.rows.simulation import BatchResult
 from castblast.explosive.isentrope import energy, pressure
 from castblast.specs.recipe import Recipe
+from castblast.types import FloatArray
 
 
 def assemble(

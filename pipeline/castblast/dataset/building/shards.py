@@ -21,10 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from castblast.dataset.building.process import peak_memory, process_name
-from castblast.dataset.rows.simulation import HISTORY_NAMES, BatchResult, FloatArray, Simulator
+from castblast.dataset.rows.simulation import HISTORY_NAMES, BatchResult, Simulator
 from castblast.disk.files import write_with
 from castblast.disk.reading import read_npz
 from castblast.errors import DatasetError, SpecError
+from castblast.types import FloatArray
 
 _NAME = re.compile(r"shard-(\d{9})-(\d{9})\.npz")
 _ORIGIN, _SEAL = "rows_sha256", "seal"

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from castblast.dataset.file.schema import HISTORIES, plausible_range, role_of
 from castblast.design.variables import INPUT_NAMES, OUTPUT_NAMES, VARIABLES
 from castblast.errors import Status
+from castblast.types import BoolArray
 
 #: Roles an input, an output may have.
 INPUT_ROLES = ("input", "derived", "fixed")
@@ -120,7 +121,7 @@ class RowCheck:
         block: xr.Dataset,
         name: str,
         what: str,
-        where: NDArray[np.bool_],
+        where: BoolArray,
         values: NDArray[Any] | None = None,
     ) -> None:
         rows = np.flatnonzero(where)
@@ -137,7 +138,7 @@ class RowCheck:
             found.ids += ids[wanted].tolist()
 
 
-def _finished(block: xr.Dataset, count: int) -> NDArray[np.bool_]:
+def _finished(block: xr.Dataset, count: int) -> BoolArray:
     if "status" in block.variables and block["status"].shape == (count,):
         return np.asarray(block["status"].to_numpy() == Status.OK)
     return np.ones(count, dtype=bool)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from castblast.design.variables import VARIABLES
 from castblast.errors import DatasetError, Status
 from castblast.specs.recipe import SPLIT_NAMES
+from castblast.types import BoolArray
 
 #: Kind and version of the format, an attribute of every file.
 SCHEMA = "castblast near-field dataset"
@@ -128,7 +129,7 @@ def flag_counts(variable: xr.DataArray) -> dict[str, int]:
     )
 
 
-def flag_rows(variable: xr.DataArray, name: str) -> NDArray[np.bool_]:
+def flag_rows(variable: xr.DataArray, name: str) -> BoolArray:
     """Rows with the code of one name."""
     meanings = _meanings(variable)
     code = meanings.index(name) if name in meanings else len(meanings)

@@ -23,11 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from castblast.blast.inputs import BoolArray
-from castblast.dataset.rows.simulation import Columns, FloatArray, Simulator, fault_kind
+from castblast.dataset.rows.simulation import Columns, Simulator, fault_kind
 from castblast.design.variables import VARIABLES
 from castblast.errors import SpecError
 from castblast.specs.recipe import Recipe, VariableSpec
+from castblast.types import BoolArray, FloatArray, Int32Array, IntArray
 
 #: A recipe with a smaller share of possible rows is refused: what is left of a Latin hypercube
 #: of which most was dropped is hardly one, and other ranges (or ratios) say better what is meant.
@@ -60,7 +60,7 @@ class Design(NamedTuple):
         Rows drawn until n were possible.
     """
 
-    sample: NDArray[np.int32]
+    sample: Int32Array
     columns: dict[str, FloatArray]
     inputs: dict[str, FloatArray]
     explosive: NDArray[np.int8]
@@ -316,7 +316,7 @@ def _broken_constraints(
     return broken | {f"charge_length below {shortest}": too_short}
 
 
-def _take(columns: Columns, rows: NDArray[np.int64]) -> dict[str, FloatArray]:
+def _take(columns: Columns, rows: IntArray) -> dict[str, FloatArray]:
     return {name: values[rows] for name, values in columns.items()}
 
 

@@ -21,13 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from castblast.dataset.rows.design import Design, row_faults
-from castblast.dataset.rows.simulation import Columns, FloatArray, Simulator
+from castblast.dataset.rows.simulation import Columns, Simulator
 from castblast.disk.files import write_text
 from castblast.errors import SpecError, nearest_name
 from castblast.names import cell_text
 from castblast.specs.catalogue import resolve_explosive
 from castblast.specs.recipe import SPLIT_NAMES, Recipe, VariableSpec
 from castblast.specs.tables.table import ID_HEADS, Form, Table, read_table
+from castblast.types import FloatArray
 
 _ROUNDING = 1e-12
 

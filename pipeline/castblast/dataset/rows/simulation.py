@@ -16,10 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from castblast.blast.inputs import (
-    BoolArray,
     FaultyRows,
     InputColumns,
-    IntArray,
     design_fault_columns,
     resolve_columns,
 )
@@ -30,8 +28,8 @@ from castblast.errors import Status
 from castblast.explosive.isentrope import Explosive
 from castblast.nearfield.case import EndMode, TensionMode
 from castblast.specs.recipe import Recipe
+from castblast.types import BoolArray, FloatArray, IndexArray
 
-FloatArray: TypeAlias = NDArray[np.float64]
 #: Names of variables to values (n,), SI.
 Columns: TypeAlias = Mapping[str, FloatArray]
 
@@ -74,15 +72,15 @@ class Simulator(Protocol):
         """Say for every row what makes it impossible; an empty string where nothing does."""
         ...
 
-    def resolve(self, columns: Columns, explosive: IntArray) -> dict[str, FloatArray]:
+    def resolve(self, columns: Columns, explosive: IndexArray) -> dict[str, FloatArray]:
         """Complete the inputs: every input by name, (n,), SI."""
         ...
 
-    def outgrown(self, inputs: Columns, explosive: IntArray) -> BoolArray:
+    def outgrown(self, inputs: Columns, explosive: IndexArray) -> BoolArray:
         """Tell which resolved rows (n,) turn out impossible only when their hole has expanded."""
         ...
 
-    def run(self, inputs: Columns, explosive: IntArray) -> BatchResult:
+    def run(self, inputs: Columns, explosive: IndexArray) -> BatchResult:
         """Simulate resolved rows; physics never raises, it sets a status."""
         ...
 
@@ -122,12 +120,12 @@ class BlastSimulator:
                 lines[row] = fault.say(row)
         return lines
 
-    def resolve(self, columns: Columns, explosive: IntArray) -> dict[str, FloatArray]:
+    def resolve(self, columns: Columns, explosive: IndexArray) -> dict[str, FloatArray]:
         """Every input of every row by `inputs.resolve_columns`."""
         values: InputColumns = {**columns, **self.solver_inputs}
         return resolve_columns(values, self.explosives, explosive, self.settings.parameter_set)
 
-    def outgrown(self, inputs: Columns, explosive: IntArray) -> BoolArray:
+    def outgrown(self, inputs: Columns, explosive: IndexArray) -> BoolArray:
         """Rows whose hole expands as wide as their burden or spacing, by `castblast.design.hole`.
 
         Only rows near that limit are simulated for it: a hole of these explosives expands to less
@@ -143,7 +141,7 @@ class BlastSimulator:
             outgrown[rows] = np.any([fault.rows for fault in faults], axis=0)
         return outgrown
 
-    def run(self, inputs: Columns, explosive: IntArray) -> BatchResult:
+    def run(self, inputs: Columns, explosive: IndexArray) -> BatchResult:
         """Simulate resolved rows in lockstep by `blast.run.run_blasts`."""
         batch = run_blasts(self.explosives, explosive, inputs, self.settings)
         finished = (batch.status == Status.OK)[:, np.newaxis]

@@ -15,8 +15,9 @@ from castblast.export.engines.bench_scripts import LAMMPS_GROUPS, bench_csv
 from castblast.export.source.answers import Answers, NotVerifiedError
 from castblast.export.source.plain import Files
 from castblast.export.source.python import VELOCITY
-from castblast.export.source.runners import Index, oldest_python, run_program, run_python, written
-from castblast.network import Floats, Network
+from castblast.export.source.runners import oldest_python, run_program, run_python, written
+from castblast.network import Network
+from castblast.types import FloatArray, IntArray
 
 _ITASCA = """
 class Ball:
@@ -44,7 +45,9 @@ for ball in itasca.ball.list():
 """
 
 
-def run_pfc(network: Network, files: Files, numeric: Floats, index: Index) -> tuple[Answers, str]:
+def run_pfc(
+    network: Network, files: Files, numeric: FloatArray, index: IntArray
+) -> tuple[Answers, str]:
     """Answers of the Python file; velocities as balls get them from it."""
     answers, tool = run_python(network, files, numeric, index)
     extra = {
@@ -59,7 +62,7 @@ def run_pfc(network: Network, files: Files, numeric: Floats, index: Index) -> tu
 
 
 def run_lammps(
-    network: Network, files: Files, numeric: Floats, index: Index
+    network: Network, files: Files, numeric: FloatArray, index: IntArray
 ) -> tuple[Answers, str]:
     """Answers of the Python file; velocities as atoms have them in LAMMPS."""
     lammps = shutil.which("lmp")
@@ -99,12 +102,12 @@ def _atoms(count: int) -> list[str]:
     ]
 
 
-def _bench(network: Network, numeric: Floats, index: Index) -> str:
+def _bench(network: Network, numeric: FloatArray, index: IntArray) -> str:
     kinds = zip(index.tolist(), numeric.tolist(), strict=True)
     return bench_csv(network, [(f"row_{j}", kind, row) for j, (kind, row) in enumerate(kinds)])
 
 
-def _with_velocities(network: Network, answers: Answers, velocities: Floats) -> Answers:
+def _with_velocities(network: Network, answers: Answers, velocities: FloatArray) -> Answers:
     """Put the speed along x of every ball in place of the predicted burden velocity."""
     if velocities.shape != (len(answers.values), 3) or np.any(velocities[:, 1:] != 0.0):
         message = "the balls do not move along the direction that was given"

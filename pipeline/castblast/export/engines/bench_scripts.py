@@ -14,7 +14,8 @@ from castblast.errors import SpecError
 from castblast.export.source.plain import Files, compact, identity, render
 from castblast.export.source.python import VELOCITY, to_python
 from castblast.names import cell_text
-from castblast.network import Floats, Network, evaluate_rows, in_domain
+from castblast.network import Network, evaluate_rows, in_domain
+from castblast.types import FloatArray
 
 #: Heads of the CSV file of a bench, before the inputs.
 BENCH_HEAD = ("group", "explosive", "direction_x", "direction_y", "direction_z")
@@ -62,7 +63,7 @@ def _example_bench(network: Network, target: str) -> list[tuple[str, int, list[f
     if VELOCITY not in network.output_names:
         message = f"export target '{target}': throws blocks, but this network gives no {VELOCITY}"
         raise SpecError(message)
-    rows: Floats = network.golden.inputs
+    rows: FloatArray = network.golden.inputs
     rows = rows[in_domain(network, rows)][-2:]
     if not len(rows):
         rows = network.golden.inputs[-2:]

@@ -12,8 +12,9 @@ import numpy as np
 
 from castblast.errors import SpecError
 from castblast.muckpile.balls.contact import ContactLaw, damped_step_factor
-from castblast.muckpile.balls.particles import FloatArray, IntArray, Particles, ball_mass
+from castblast.muckpile.balls.particles import Particles, ball_mass
 from castblast.muckpile.cast.case import CastCase
+from castblast.types import FloatArray, IntArray
 
 #: LAMMPS has 32 groups; one per type, and a few others.
 MOST_TYPES = 24

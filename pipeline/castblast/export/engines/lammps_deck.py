@@ -36,8 +36,8 @@ from castblast.export.engines.deck import (
 )
 from castblast.export.engines.lammps_walls import WallRegion, wall_regions
 from castblast.muckpile.balls.contact import ContactLaw, DashpotMode
-from castblast.muckpile.balls.particles import FloatArray
 from castblast.muckpile.cast.case import CastCase, check_case
+from castblast.types import FloatArray
 
 #: Damping coefficient alpha of restitution e, from e^0 to e^6 (Tsuji et al. 1992).
 _TSUJI = (1.2728, -4.2783, 11.087, -22.348, 27.467, -18.022, 4.8218)

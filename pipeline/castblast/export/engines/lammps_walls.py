@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from castblast.muckpile.ground.walls import Walls
+from castblast.types import FloatArray
 
 
 class WallRegion(NamedTuple):
@@ -59,7 +59,7 @@ def _region(walls: Walls, k: int, words: str) -> WallRegion:
     return WallRegion(f"wall{k}", words, float(walls.friction[k]), float(walls.rolling_friction[k]))
 
 
-def _box_behind(walls: Walls, k: int) -> NDArray[np.float64] | None:
+def _box_behind(walls: Walls, k: int) -> FloatArray | None:
     """Ends (3, 2) [m] of the box of which wall `k` is a face; None if it has no such box."""
     axes = np.stack([walls.axis1[k], walls.axis2[k], walls.normal[k]])
     direction = np.argmax(np.abs(axes), axis=1)

@@ -35,8 +35,9 @@ from castblast.export.engines.deck import (
 )
 from castblast.export.engines.liggghts_walls import WallKind, stl_text, wall_kinds
 from castblast.muckpile.balls.contact import ContactLaw, DashpotMode
-from castblast.muckpile.balls.particles import FloatArray, ball_mass
+from castblast.muckpile.balls.particles import ball_mass
 from castblast.muckpile.cast.case import CastCase, check_case
+from castblast.types import FloatArray
 
 _MODEL = "model hooke/stiffness tangential history rolling_friction epsd2"
 

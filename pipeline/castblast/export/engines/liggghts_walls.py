@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from castblast.muckpile.balls.particles import FloatArray
 from castblast.muckpile.ground.walls import Walls
+from castblast.types import FloatArray
 
 #: Half side [m] of what stands for an endless wall before it is clipped.
 _ENDLESS = 1e6

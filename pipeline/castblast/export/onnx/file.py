@@ -36,13 +36,13 @@ from castblast.network import (
     BLAME,
     Bounds,
     DensityScore,
-    Floats,
     Layer,
     Network,
     Shell,
     derived_matrix,
     prediction_factors,
 )
+from castblast.types import FloatArray, IntArray
 
 _IR_VERSION = 7
 #: Code of float64 in ONNX, for `Cast`.
@@ -294,12 +294,12 @@ def _metadata(shell: Shell) -> dict[str, str]:
     return {key: json.dumps(value) for key, value in entries.items()}
 
 
-def run_onnx(model: bytes, numeric: Floats, index: NDArray[np.int64]) -> Floats:
+def run_onnx(model: bytes, numeric: FloatArray, index: IntArray) -> FloatArray:
     """Values (n, m) of an ONNX file for SI rows (n, k), in the order of its outputs."""
     return run_onnx_rows(model, numeric, index).values
 
 
-def run_onnx_rows(model: bytes, numeric: Floats, index: NDArray[np.int64]) -> Answers:
+def run_onnx_rows(model: bytes, numeric: FloatArray, index: IntArray) -> Answers:
     """Evaluate an ONNX file: with onnxruntime on one thread, or with the reference of ONNX.
 
     Parameters

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.network import Column, Constraint, Floats, Layer
+from castblast.network import Column, Constraint, Layer
+from castblast.types import FloatArray
 
 _OPERATORS = {"tanh": "Tanh", "relu": "Relu", "logistic": "Sigmoid"}
 
@@ -98,6 +99,6 @@ class Graph:
         return self.add("ReduceSum", label, x, axes, keepdims=0)
 
 
-def values_of(columns: Sequence[Column | Constraint], attribute: str) -> Floats:
+def values_of(columns: Sequence[Column | Constraint], attribute: str) -> FloatArray:
     """One number of every column or rule."""
     return np.array([getattr(column, attribute) for column in columns], dtype=np.float64)

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from castblast.names import printable
-from castblast.network import BLAME, Column, Constraint, Floats, Network, prediction_factors
+from castblast.network import BLAME, Column, Constraint, Network, prediction_factors
+from castblast.types import FloatArray
 
 if TYPE_CHECKING:
     from openpyxl.worksheet.worksheet import Worksheet
@@ -42,7 +43,7 @@ class Constants:
         self.row = 1
         self.known: dict[str, str] = {}
 
-    def place(self, title: str, matrix: Sequence[Sequence[Any]] | Floats) -> str:
+    def place(self, title: str, matrix: Sequence[Sequence[Any]] | FloatArray) -> str:
         """Write a matrix and return its absolute address; the same title is written once."""
         if title in self.known:
             return self.known[title]

@@ -12,13 +12,8 @@ from castblast.design.rule import COMPLETED, complete_columns, design_fault_colu
 from castblast.design.variables import INPUT_NAMES, VARIABLES
 from castblast.export.source.plain import example_row
 from castblast.names import cell_text
-from castblast.network import (
-    Floats,
-    InputColumn,
-    Network,
-    keeps_ranges_and_rules,
-    predict_rows,
-)
+from castblast.network import InputColumn, Network, keeps_ranges_and_rules, predict_rows
+from castblast.types import FloatArray
 
 #: What a blaster looks up by; other inputs stay at an example design.
 _AXES = ("hole_diameter", "burden", "ucs", "bench_height")
@@ -51,7 +46,7 @@ def lookup_csv(network: Network) -> str:
     return stream.getvalue()
 
 
-def _grid(network: Network, axes: list[str]) -> Floats:
+def _grid(network: Network, axes: list[str]) -> FloatArray:
     """Rows of the grid that are possible and keep ranges and rules, (n, k)."""
     names = network.input_names
     columns = {column.name: column for column in network.inputs}

@@ -12,11 +12,14 @@ from castblast.errors import CheckError
 from castblast.export.sheet.workbook import TOP
 from castblast.export.source.answers import Answers, NotVerifiedError, answers
 from castblast.export.source.plain import Files
-from castblast.export.source.runners import Index, run_program, written
-from castblast.network import Bounds, Floats, Network
+from castblast.export.source.runners import run_program, written
+from castblast.network import Bounds, Network
+from castblast.types import FloatArray, IntArray
 
 
-def run_excel(network: Network, files: Files, numeric: Floats, index: Index) -> tuple[Answers, str]:
+def run_excel(
+    network: Network, files: Files, numeric: FloatArray, index: IntArray
+) -> tuple[Answers, str]:
     """Answers of sheet Check, whose rows must be the ones asked for; Predict must agree too."""
     book = recalculated(files["model.xlsx"])
     k, m = len(network.inputs), len(network.outputs)
@@ -58,7 +61,7 @@ def recalculated(content: bytes) -> Any:
         return openpyxl.load_workbook(io.BytesIO(result.read_bytes()), data_only=True)
 
 
-def _table(sheet: Any, rows: int) -> Floats:
+def _table(sheet: Any, rows: int) -> FloatArray:
     """Numbers of the rows of designs; errors and empty cells are NaN."""
     lines = sheet.iter_rows(min_row=TOP, max_row=TOP + rows - 1, values_only=True)
     return np.array(
@@ -73,7 +76,7 @@ def _starts(sheet: Any) -> dict[str, int]:
     return {str(head): i for i, head in enumerate(heads) if head is not None}
 
 
-def _read(table: Floats, start: dict[str, int], k: int, m: int) -> Answers:
+def _read(table: FloatArray, start: dict[str, int], k: int, m: int) -> Answers:
     ends = [f"{kind} {end}" for kind in ("prediction", "network") for end in Bounds._fields]
     values, *parts = (table[:, start[title] : start[title] + m] for title in ("value", *ends))
     bands = Bounds(*parts[:2]), Bounds(*parts[2:])

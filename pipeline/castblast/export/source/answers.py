@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from castblast.network import Bounds, Floats, Network, offending_inputs, predict_rows
+from castblast.network import Bounds, Network, offending_inputs, predict_rows
+from castblast.types import BoolArray, FloatArray, IntArray
 
 
 class NotVerifiedError(Exception):
@@ -32,15 +32,15 @@ class Answers(NamedTuple):
         Inputs that take part in what is broken.
     """
 
-    values: Floats
+    values: FloatArray
     prediction: Bounds
     network: Bounds
-    score: Floats
-    inside: NDArray[np.bool_]
-    offending: NDArray[np.bool_]
+    score: FloatArray
+    inside: BoolArray
+    offending: BoolArray
 
 
-def answers(network: Network, numeric: Floats, index: NDArray[np.int64]) -> Answers:
+def answers(network: Network, numeric: FloatArray, index: IntArray) -> Answers:
     """Answer rows with the network itself: what every copy is held against."""
     return Answers(*predict_rows(network, numeric, index), offending_inputs(network, numeric))
 
@@ -59,7 +59,7 @@ def parse_answers(text: str, inputs: int) -> Answers:
     return Answers(values, *bands, score, domain == 0.0, flags != 0.0)
 
 
-def row_lines(numeric: Floats, index: NDArray[np.int64]) -> str:
+def row_lines(numeric: FloatArray, index: IntArray) -> str:
     """Write rows as self-tests read them: position of the explosive, then the inputs."""
     words = {"nan": "NaN", "inf": "Infinity", "-inf": "-Infinity"}
     lines = []

@@ -21,7 +21,6 @@ from castblast.design.variables import VARIABLES
 from castblast.network import (
     BLAME,
     Column,
-    Floats,
     Layer,
     Network,
     density_score,
@@ -30,6 +29,7 @@ from castblast.network import (
     prediction_factors,
 )
 from castblast.network.json_file import pretty
+from castblast.types import FloatArray
 
 #: Files of one export: name to contents.
 Files = dict[str, bytes]
@@ -141,7 +141,7 @@ def example_row(network: Network) -> list[float]:
     usual = np.array([_usual_values(network)])
     if in_domain(network, usual)[0]:
         return [float(value) for value in usual[0]]
-    rows: Floats = network.golden.inputs
+    rows: FloatArray = network.golden.inputs
     rows = rows[in_domain(network, rows)] if len(rows) else rows
     if not len(rows):
         return [0.5 * (column.lower + column.upper) for column in network.inputs]

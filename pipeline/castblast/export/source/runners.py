@@ -17,9 +17,6 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import numpy as np
-from numpy.typing import NDArray
-
 from castblast.errors import CheckError
 from castblast.export.onnx.file import run_onnx_rows
 from castblast.export.source.answers import (
@@ -32,28 +29,34 @@ from castblast.export.source.answers import (
 from castblast.export.source.c import STRICT_FLAGS
 from castblast.export.source.plain import Files
 from castblast.export.source.python import OLDEST
-from castblast.network import Floats, Network
+from castblast.network import Network
 from castblast.network.json_file import from_json
+from castblast.types import FloatArray, IntArray
 
 _SECONDS = 300
 RUN_ROWS = Path(__file__).parents[1] / "templates" / "run_rows.mjs"
 
-Index = NDArray[np.int64]
 #: Network (for its names only), files and rows in; answers and the name of the tool out.
-Runner = Callable[[Network, Files, Floats, Index], tuple[Answers, str]]
+Runner = Callable[[Network, Files, FloatArray, IntArray], tuple[Answers, str]]
 
 
-def run_json(network: Network, files: Files, numeric: Floats, index: Index) -> tuple[Answers, str]:
+def run_json(
+    network: Network, files: Files, numeric: FloatArray, index: IntArray
+) -> tuple[Answers, str]:
     """Read the record back and evaluate it."""
     return answers(from_json(files["network.json"].decode()), numeric, index), "NumPy"
 
 
-def run_onnx(network: Network, files: Files, numeric: Floats, index: Index) -> tuple[Answers, str]:
+def run_onnx(
+    network: Network, files: Files, numeric: FloatArray, index: IntArray
+) -> tuple[Answers, str]:
     """Run with onnxruntime, or the reference of ONNX."""
     return run_onnx_rows(files["model.onnx"], numeric, index), "ONNX"
 
 
-def run_c(network: Network, files: Files, numeric: Floats, index: Index) -> tuple[Answers, str]:
+def run_c(
+    network: Network, files: Files, numeric: FloatArray, index: IntArray
+) -> tuple[Answers, str]:
     """Compile with every warning an error, run the self-test, then the rows."""
     with written(files) as folder:
         program = compile_c(folder)
@@ -77,7 +80,9 @@ def compile_c(folder: Path) -> Path:
     return program
 
 
-def run_js(network: Network, files: Files, numeric: Floats, index: Index) -> tuple[Answers, str]:
+def run_js(
+    network: Network, files: Files, numeric: FloatArray, index: IntArray
+) -> tuple[Answers, str]:
     """Import the module in node and answer the rows."""
     node = shutil.which("node")
     if node is None:
@@ -90,7 +95,7 @@ def run_js(network: Network, files: Files, numeric: Floats, index: Index) -> tup
 
 
 def run_python(
-    network: Network, files: Files, numeric: Floats, index: Index
+    network: Network, files: Files, numeric: FloatArray, index: IntArray
 ) -> tuple[Answers, str]:
     """Run the self-test and the rows in the oldest interpreter at hand."""
     program, version = oldest_python()

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from castblast.kernel import inline_kernel
-from castblast.muckpile.balls.particles import RealArray
+from castblast.types import RealArray
 
 Vector: TypeAlias = tuple[float, float, float]
 

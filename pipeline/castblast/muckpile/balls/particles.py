@@ -6,17 +6,12 @@ do to a pile enters through the rolling resistance of the contact law.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray: TypeAlias = NDArray[np.float64]
-IntArray: TypeAlias = NDArray[np.int64]
-#: Lists of the engine: half the memory, and 2^31 contacts are more than a machine holds.
-Int32Array: TypeAlias = NDArray[np.int32]
-#: In the working precision of a simulation: float64 or float32.
-RealArray: TypeAlias = NDArray[np.floating[Any]]
+from castblast.types import FloatArray, IntArray
 
 
 class Particles(NamedTuple):

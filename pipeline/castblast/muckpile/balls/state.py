@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from castblast.muckpile.balls.contact import ROW
-from castblast.muckpile.balls.particles import FloatArray, Int32Array, RealArray
+from castblast.types import FloatArray, Int32Array, RealArray
 
 #: Working precisions and the type of what they store beside positions.
 PRECISIONS: dict[str, DTypeLike] = {"float64": np.float64, "mixed": np.float32}
@@ -103,7 +103,7 @@ def make_contacts(
     )
 
 
-def starts(number: NDArray[np.int32]) -> Int32Array:
+def starts(number: Int32Array) -> Int32Array:
     """Return the running total (n + 1,) of counts (n,)."""
     start = np.zeros(len(number) + 1, dtype=np.int32)
     np.cumsum(number, out=start[1:])

@@ -13,10 +13,10 @@ from math import ceil, inf, sqrt
 
 import numpy as np
 
-from castblast.muckpile.balls.particles import FloatArray
 from castblast.muckpile.bench.geometry import Bench, bench_outline
 from castblast.muckpile.bench.outline import FREE, ROCK, Outline, is_convex, section_at
 from castblast.muckpile.ground.walls import Walls, floor, join, plane, rectangle
+from castblast.types import FloatArray
 
 
 def holding_walls(bench: Bench, mean_radius: float) -> Walls:

@@ -17,8 +17,8 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 from scipy.optimize import brentq
 
-from castblast.muckpile.balls.particles import FloatArray
 from castblast.muckpile.bench.sizes import Sizes, mean_ball_volume, sizes_by_volume
+from castblast.types import FloatArray
 
 #: Limits of the rock factor and of the uniformity index in the sources.
 ROCK_FACTOR = (0.8, 22.0)

@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from castblast.muckpile.balls.particles import FloatArray, IntArray
 from castblast.muckpile.bench.outline import (
     FREE,
     OPEN,
@@ -27,6 +26,7 @@ from castblast.muckpile.bench.outline import (
     outline_volume,
 )
 from castblast.muckpile.bench.timing import echelon_delays, row_delays, v_delays
+from castblast.types import FloatArray, IntArray
 
 __all__ = [
     "Bench",

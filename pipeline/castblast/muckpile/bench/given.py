@@ -6,12 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from castblast.muckpile.balls.contact import ContactLaw
-from castblast.muckpile.balls.particles import (
-    FloatArray,
-    Particles,
-    check_particles,
-    particles_at_rest,
-)
+from castblast.muckpile.balls.particles import Particles, check_particles, particles_at_rest
+from castblast.types import FloatArray
 
 #: Overlap over radius with another ball from which a state is refused.
 MOST_OVERLAP = 0.10

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from castblast.muckpile.balls.particles import FloatArray
+from castblast.types import FloatArray
 
 FREE, ROCK, OPEN = "free", "rock", "open"
 EDGE_KINDS = (FREE, ROCK, OPEN)

@@ -17,7 +17,7 @@ import numpy as np
 
 from castblast.errors import SpecError, Status
 from castblast.muckpile.balls.contact import ContactLaw
-from castblast.muckpile.balls.particles import FloatArray, Particles, particles_at_rest
+from castblast.muckpile.balls.particles import Particles, particles_at_rest
 from castblast.muckpile.bench.enclosure import holding_walls, parting_planes
 from castblast.muckpile.bench.geometry import (
     Bench,
@@ -50,6 +50,7 @@ from castblast.muckpile.engine.simulation import Simulation
 from castblast.muckpile.engine.threads import thread_count
 from castblast.progress import ProgressCallback, silent
 from castblast.stopping import NEVER, StopRequest
+from castblast.types import FloatArray
 
 #: Solid fractions that random packings of rough balls can have at rest under gravity.
 LOOSEST, DENSEST = 0.55, 0.63

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from castblast.kernel import kernel
-from castblast.muckpile.balls.particles import FloatArray, Particles
+from castblast.muckpile.balls.particles import Particles
 from castblast.muckpile.bench.geometry import Bench, bench_outline, crest_position
 from castblast.muckpile.bench.outline import depth_inside, polygon_area, section_at
+from castblast.types import BoolArray, FloatArray, IntArray
 
 #: Most nodes of the lattice, and its spacing over the mean radius where fewer are enough.
 _MOST_NODES, _FINE = 3e6, 0.2871
@@ -54,8 +54,8 @@ def _narrowest(bench: Bench) -> float:
 
 
 def _nodes_inside(
-    bench: Bench, first: FloatArray, spacing: FloatArray, size: NDArray[np.int64], keep: float
-) -> NDArray[np.bool_]:
+    bench: Bench, first: FloatArray, spacing: FloatArray, size: IntArray, keep: float
+) -> BoolArray:
     """Lattice nodes (nx, ny, nz) that lie deep enough in the bench."""
     outline = bench_outline(bench)
     x, y, z = (first[axis] + spacing[axis] * np.arange(size[axis]) for axis in range(3))
@@ -73,7 +73,7 @@ def _count_covered(
     radius: FloatArray,
     low: FloatArray,
     spacing: FloatArray,
-    inside: NDArray[np.bool_],
+    inside: BoolArray,
 ) -> int:
     """Number of the nodes `inside` that lie in a ball, once for each ball: they hardly overlap."""
     covered = 0

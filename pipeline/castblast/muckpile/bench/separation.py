@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from castblast.kernel import kernel
-from castblast.muckpile.balls.particles import FloatArray, Int32Array
 from castblast.muckpile.bench.outline import Outline
 from castblast.muckpile.engine.threads import require_threads
 from castblast.muckpile.ground.walls import Walls
@@ -24,6 +23,7 @@ from castblast.muckpile.search.neighbours import make_grid, sort_by_cell
 from castblast.muckpile.search.pair_search import list_pairs
 from castblast.muckpile.search.paths import lay_out
 from castblast.progress import ProgressCallback, silent
+from castblast.types import FloatArray, Int32Array
 
 #: Over the mean radius: skin of the pair list.
 _SKIN = 0.4

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtr
 
-from castblast.muckpile.balls.particles import FloatArray
+from castblast.types import FloatArray
 
 _NODES = 257
 #: A normal distribution of radii is cut at so many standard deviations.

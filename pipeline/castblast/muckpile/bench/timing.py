@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from castblast.muckpile.balls.particles import FloatArray, IntArray
+from castblast.types import FloatArray, IntArray
 
 
 def echelon_delays(

@@ -8,9 +8,10 @@ import numpy as np
 
 from castblast.errors import Status
 from castblast.muckpile.balls.contact import ContactLaw, check_law
-from castblast.muckpile.balls.particles import FloatArray, IntArray, Particles
+from castblast.muckpile.balls.particles import Particles
 from castblast.muckpile.balls.state import PRECISIONS
 from castblast.muckpile.ground.walls import Walls
+from castblast.types import FloatArray, IntArray
 
 
 class CastCase(NamedTuple):

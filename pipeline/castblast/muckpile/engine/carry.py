@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from castblast.kernel import lean_kernel, parallel_kernel
 from castblast.muckpile.balls.contact import ROW
-from castblast.muckpile.balls.particles import Int32Array, RealArray
 from castblast.muckpile.balls.state import Contacts, starts
 from castblast.muckpile.search.neighbours import PIECES
+from castblast.types import Int32Array, RealArray
 
 _Real = TypeVar("_Real", bound=np.floating[Any])
 

@@ -11,7 +11,7 @@ from math import sqrt
 
 from castblast.kernel import fused_kernel, inline_kernel
 from castblast.muckpile.balls.contact import Constants, Vector
-from castblast.muckpile.balls.particles import FloatArray, RealArray
+from castblast.types import FloatArray, RealArray
 
 
 @fused_kernel

@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 
 from castblast.kernel import inline_kernel, lean_kernel, parallel_kernel
 from castblast.muckpile.balls.contact import Constants
-from castblast.muckpile.balls.particles import FloatArray, Int32Array, IntArray, RealArray
 from castblast.muckpile.balls.state import Balls, Contacts
 from castblast.muckpile.engine.pair_forces import BLOCK_NAMES, BLOCK_NUMBERS, pair_forces
 from castblast.muckpile.engine.wall_forces import wall_forces
 from castblast.muckpile.ground.walls import WallTable
+from castblast.types import FloatArray, Int32Array, IntArray, RealArray
 
 #: Most sweeps that run side by side; more threads than that have nothing to do.
 MOST_CHUNKS = 32

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from castblast.kernel import fused_kernel, inline_kernel, lean_kernel
 from castblast.muckpile.balls.contact import Constants, ball_stiffness, close_contact
-from castblast.muckpile.balls.particles import FloatArray, Int32Array, RealArray
 from castblast.muckpile.engine.contact_step import book_opening, book_step, step_contact
+from castblast.types import FloatArray, Int32Array, RealArray
 
 #: Contacts of a block, and how many of them are computed together.
 BLOCK, LANES = 32, 16

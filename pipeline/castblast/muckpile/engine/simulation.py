@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from castblast.muckpile.balls.contact import ContactLaw, damped_step_factor, law_constants
-from castblast.muckpile.balls.particles import FloatArray, Int32Array, Particles, ball_mass
+from castblast.muckpile.balls.particles import Particles, ball_mass
 from castblast.muckpile.balls.state import PRECISIONS, Balls, Contacts, make_contacts
 from castblast.muckpile.engine.carry import inverse, put_aside, restore, take_rows
 from castblast.muckpile.engine.dynamics import advance, cut_chunks, present_forces
@@ -37,6 +37,7 @@ from castblast.muckpile.search.pair_search import list_pairs
 from castblast.muckpile.search.paths import lay_out, straight_paths
 from castblast.muckpile.search.wall_search import list_walls
 from castblast.stopping import NEVER, StopRequest
+from castblast.types import BoolArray, FloatArray, Int32Array
 
 #: Skin over mean diameter; measured as the fastest for balls in free flight and at rest.
 SKIN_RATIO = 0.10
@@ -91,7 +92,7 @@ class Simulation:
     particles: Particles
     law: ContactLaw
     walls: Walls
-    held: NDArray[np.bool_]
+    held: BoolArray
     gravity: float = 9.81
     step_safety: float = 0.8
     time_step: float = 0.0
@@ -168,7 +169,7 @@ class Simulation:
         """Kinetic energy [J] taken from balls that fell asleep so far."""
         return self._slept
 
-    def asleep(self) -> NDArray[np.bool_]:
+    def asleep(self) -> BoolArray:
         """Which balls (n,) sleep, in the caller's order."""
         sleeps = np.empty(len(self._balls.place), dtype=np.bool_)
         sleeps[self._balls.identity] = self._balls.motion[:, 7] == ASLEEP
@@ -213,7 +214,7 @@ class Simulation:
 
     # -- actions -----------------------------------------------------------------------------
 
-    def fire(self, chosen: NDArray[np.bool_], velocity: FloatArray) -> None:
+    def fire(self, chosen: BoolArray, velocity: FloatArray) -> None:
         """Release the `chosen` balls (n,) with `velocity` (n, 3) [m s-1]; spins stay.
 
         Contacts among held balls are not listed; they appear now, with the load of their overlap.

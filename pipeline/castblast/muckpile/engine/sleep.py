@@ -24,12 +24,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import prange
-from numpy.typing import NDArray
 
 from castblast.kernel import lean_kernel, parallel_kernel
-from castblast.muckpile.balls.particles import FloatArray, Int32Array, IntArray, RealArray
 from castblast.muckpile.balls.state import Balls
 from castblast.muckpile.search.neighbours import PIECES
+from castblast.types import BoolArray, FloatArray, Int32Array, IntArray, RealArray
 
 #: What a ball may do: the last word of its row of motion.
 FREE, HELD, ASLEEP = 0.0, 1.0, 2.0
@@ -140,8 +139,8 @@ def _mark_neighbours(
     start: Int32Array,
     partner: Int32Array,
     slab: IntArray,
-    source: NDArray[np.bool_],
-    target: NDArray[np.bool_],
+    source: BoolArray,
+    target: BoolArray,
 ) -> None:
     """Mark in `target` whoever has a ball of `source` in its list, or is in the list of one."""
     slabs = len(slab) - 1
@@ -158,8 +157,8 @@ def _mark_piece(
     partner: Int32Array,
     first: int,
     last: int,
-    source: NDArray[np.bool_],
-    target: NDArray[np.bool_],
+    source: BoolArray,
+    target: BoolArray,
 ) -> None:
     for i in range(first, last):
         for p in range(start[i], start[i + 1]):
@@ -171,7 +170,7 @@ def _mark_piece(
 
 
 @parallel_kernel
-def _change_over(balls: Balls, disturbed: NDArray[np.bool_], patience: float) -> FloatArray:
+def _change_over(balls: Balls, disturbed: BoolArray, patience: float) -> FloatArray:
     """Wake and put to sleep; returns the energy [J] taken, by pieces."""
     taken = np.zeros(PIECES)
     count = len(disturbed)
@@ -188,7 +187,7 @@ def _change_piece(
     place: FloatArray,
     motion: RealArray,
     force: RealArray,
-    disturbed: NDArray[np.bool_],
+    disturbed: BoolArray,
     patience: float,
     first: int,
     last: int,

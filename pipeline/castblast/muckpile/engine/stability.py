@@ -14,9 +14,9 @@ from numba import prange
 
 from castblast.kernel import inline_kernel, lean_kernel, parallel_kernel
 from castblast.muckpile.balls.contact import Constants, wall_stiffness
-from castblast.muckpile.balls.particles import IntArray, RealArray
 from castblast.muckpile.balls.state import Balls, Contacts
 from castblast.muckpile.ground.walls import WallTable, wall_distance
+from castblast.types import IntArray, RealArray
 
 
 @parallel_kernel

@@ -13,11 +13,11 @@ from numba import prange
 
 from castblast.kernel import lean_kernel, parallel_kernel
 from castblast.muckpile.balls.contact import Constants, spring_energy
-from castblast.muckpile.balls.particles import FloatArray, IntArray, RealArray
 from castblast.muckpile.balls.state import Balls, Contacts
 from castblast.muckpile.engine.threads import require_threads
 from castblast.muckpile.ground.walls import WallTable, wall_distance
 from castblast.muckpile.search.neighbours import PIECES
+from castblast.types import FloatArray, IntArray, RealArray
 
 #: Overlap over the radius of the smaller ball from which a contact counts as deep.
 DEEP = 0.5

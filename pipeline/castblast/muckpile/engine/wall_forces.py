@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from castblast.kernel import inline_kernel
 from castblast.muckpile.balls.contact import Constants, close_contact, wall_stiffness
-from castblast.muckpile.balls.particles import FloatArray, RealArray
 from castblast.muckpile.engine.contact_step import book_opening, book_step, step_contact
 from castblast.muckpile.ground.facets import hand_over
 from castblast.muckpile.ground.walls import WallTable, wall_distance, wall_friction
+from castblast.types import FloatArray, Int32Array, RealArray
 
 
 @inline_kernel
@@ -21,7 +21,7 @@ def wall_forces(
     place: FloatArray,
     motion: RealArray,
     force: RealArray,
-    partner: NDArray[np.int32],
+    partner: Int32Array,
     memory: RealArray,
     touching: NDArray[np.uint8],
     dash: RealArray,

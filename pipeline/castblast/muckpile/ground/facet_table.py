@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from castblast.kernel import kernel
-from castblast.muckpile.balls.particles import FloatArray, IntArray
 from castblast.muckpile.ground.facets import FACET_WORDS, LEVEL, LEVEL_COSINE, WallTable
+from castblast.types import FloatArray, Int32Array, IntArray
 
 #: Corners at both ends of the edges ab, bc, ca.
 EDGES = ((0, 1), (1, 2), (2, 0))
@@ -114,7 +114,7 @@ def _feature_normals(
 
 def _neighbours(
     corner: FloatArray, normal: FloatArray, number: IntArray, places: int
-) -> tuple[IntArray, NDArray[np.int32], NDArray[np.uint8]]:
+) -> tuple[IntArray, Int32Array, NDArray[np.uint8]]:
     """Facets that share corners with each facet, see `WallTable`."""
     from scipy.sparse import csr_array
 
@@ -140,7 +140,7 @@ def _neighbours(
 
 def _lay_grid(
     low: FloatArray, high: FloatArray
-) -> tuple[IntArray, NDArray[np.int32], NDArray[np.int32], FloatArray]:
+) -> tuple[IntArray, Int32Array, Int32Array, FloatArray]:
     """Grid over facets that reach from `low` to `high` (t, 2) [m] in plan, see `WallTable`."""
     corner, far = low.min(axis=0), high.max(axis=0)
     extent = np.maximum(far - corner, 1e-6)
@@ -156,8 +156,8 @@ def _lay_grid(
 
 @kernel
 def _fill_cells(
-    span: NDArray[np.int32], last: NDArray[np.int32], nx: int, ny: int
-) -> tuple[IntArray, NDArray[np.int32]]:
+    span: Int32Array, last: Int32Array, nx: int, ny: int
+) -> tuple[IntArray, Int32Array]:
     """Facets of every cell, by number."""
     start = np.zeros(nx * ny + 1, np.int64)
     for k in range(len(span)):

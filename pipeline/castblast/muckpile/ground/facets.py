@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from castblast.kernel import inline_kernel, kernel, lean_kernel
 from castblast.muckpile.balls.contact import Vector
-from castblast.muckpile.balls.particles import FloatArray, IntArray, RealArray
+from castblast.types import FloatArray, Int32Array, IntArray, RealArray
 
 #: Words of a row: corners (9), normal (3), normals of the edges ab, bc, ca (9) and of the corners
 #: (9), friction, rolling friction, depth. NaN in the normal of an edge or corner: it cannot be
@@ -66,11 +66,11 @@ class WallTable(NamedTuple):
     plane: FloatArray
     facet: FloatArray
     start: IntArray
-    around: NDArray[np.int32]
+    around: Int32Array
     shared: NDArray[np.uint8]
     cell_start: IntArray
-    cell: NDArray[np.int32]
-    span: NDArray[np.int32]
+    cell: Int32Array
+    span: Int32Array
     grid: FloatArray
 
 
@@ -211,7 +211,7 @@ def near_facets(
     y: float,
     z: float,
     reach: float,
-    found: NDArray[np.int32],
+    found: Int32Array,
     at: int,
 ) -> int:
     """Count facets within `reach` of a point; write their wall numbers to ``found[at:]``.
@@ -277,7 +277,7 @@ def facet_height(table: WallTable, x: FloatArray, y: FloatArray, height: FloatAr
 def hand_over(
     table: WallTable,
     place: FloatArray,
-    partner: NDArray[np.int32],
+    partner: Int32Array,
     memory: RealArray,
     touching: NDArray[np.uint8],
     dash: RealArray,

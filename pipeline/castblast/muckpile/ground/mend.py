@@ -12,10 +12,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from castblast.muckpile.balls.particles import FloatArray, IntArray
 from castblast.muckpile.ground.facet_table import corner_numbers, edge_numbers
+from castblast.types import BoolArray, FloatArray, IntArray
 
 #: Corners closer together than this [m] are one, and facets lower than this have no height.
 WELD = 1e-3
@@ -75,7 +74,7 @@ def median_side(corner: FloatArray) -> float:
     return float(np.median(np.linalg.norm(corner - np.roll(corner, -1, axis=1), axis=2)))
 
 
-def weld(corner: FloatArray, distance: float) -> tuple[FloatArray, NDArray[np.bool_]]:
+def weld(corner: FloatArray, distance: float) -> tuple[FloatArray, BoolArray]:
     """Join corners that lie within `distance` [m] of each other.
 
     Returns
@@ -167,7 +166,7 @@ def _without_flat(
 
 def _split_beside(
     corner: FloatArray, source: IntArray, bad: IntArray, longest: IntArray
-) -> tuple[NDArray[np.bool_], FloatArray, IntArray]:
+) -> tuple[BoolArray, FloatArray, IntArray]:
     """Which facets stay, and the halves of those that a flat facet borders with its long side."""
     number, _ = corner_numbers(corner)
     edge, _, meeting = edge_numbers(number)
@@ -198,7 +197,7 @@ def _split_beside(
     return keep, split, np.array(sources, dtype=np.int64)
 
 
-def _turned(corner: FloatArray, towards: FloatArray | None) -> NDArray[np.bool_]:
+def _turned(corner: FloatArray, towards: FloatArray | None) -> BoolArray:
     """Facets that must be turned so that each connected piece has one side, the right one.
 
     Two copies of every facet, one turned, are joined across each edge so that both sides agree;

@@ -9,10 +9,10 @@ from __future__ import annotations
 from math import inf, nan
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from castblast.kernel import kernel
-from castblast.muckpile.balls.particles import FloatArray, IntArray, Particles
+from castblast.muckpile.balls.particles import Particles
 from castblast.muckpile.ground.facet_table import corner_numbers, edge_numbers
 from castblast.muckpile.ground.facets import WallTable
 from castblast.muckpile.ground.walls import (
@@ -24,6 +24,7 @@ from castblast.muckpile.ground.walls import (
     wall_distance,
     wall_table,
 )
+from castblast.types import BoolArray, FloatArray, IntArray
 
 #: How many radii below ground from heights a ball is still held.
 GROUND_DEPTH = 3.0
@@ -34,7 +35,7 @@ _THINNEST = 1e-6
 _NAMED = 3
 
 
-def complete_cells(height: FloatArray) -> NDArray[np.bool_]:
+def complete_cells(height: FloatArray) -> BoolArray:
     """Cells (ny - 1, nx - 1) of a grid of heights (ny, nx) with a height at all four corners."""
     known = np.isfinite(height)
     return known[:-1, :-1] & known[:-1, 1:] & known[1:, :-1] & known[1:, 1:]
@@ -158,7 +159,7 @@ def heightmap(
     return join(ground, surface(ends, friction, base=base, welded=True))
 
 
-def _border(point: FloatArray, complete: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
+def _border(point: FloatArray, complete: BoolArray) -> tuple[FloatArray, FloatArray]:
     """Starts and ends (k, 3) [m] of the edges around the cells of a grid (ny, nx, 3) that are."""
     ring = np.concatenate([point[0, :-1], point[:-1, -1], point[-1, :0:-1], point[:0:-1, 0]])
     cells = [complete[0], complete[:, -1], complete[-1, ::-1], complete[::-1, 0]]

@@ -13,11 +13,10 @@ from math import inf, nan, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from castblast.kernel import inline_kernel
 from castblast.muckpile.balls.contact import Vector
-from castblast.muckpile.balls.particles import FloatArray
 from castblast.muckpile.ground.facet_table import make_table
 from castblast.muckpile.ground.facets import (
     FACET_FRICTION,
@@ -28,6 +27,7 @@ from castblast.muckpile.ground.facets import (
     near_facets,
 )
 from castblast.muckpile.ground.mend import weld, weld_distance
+from castblast.types import BoolArray, FloatArray, Int32Array
 
 __all__ = ["WallTable", "Walls", "floor", "ground_height", "join", "near_walls"]
 __all__ += ["plane", "rectangle", "slope", "surface"]
@@ -69,7 +69,7 @@ class Walls(NamedTuple):
     bounds: FloatArray
     friction: FloatArray
     rolling_friction: FloatArray
-    rim: NDArray[np.bool_]
+    rim: BoolArray
     corner: FloatArray = np.zeros((0, 3, 3))
     facet_friction: FloatArray = np.zeros(0)
     facet_rolling_friction: FloatArray = np.zeros(0)
@@ -291,7 +291,7 @@ def near_walls(
     y: float,
     z: float,
     reach: float,
-    found: NDArray[np.int32],
+    found: Int32Array,
     at: int,
 ) -> int:
     """Count the walls within `reach` of a point; write them to ``found[at:]`` if at >= 0."""

@@ -14,9 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from castblast.muckpile.balls.particles import FloatArray, Particles
+from castblast.muckpile.balls.particles import Particles
 from castblast.muckpile.ground.walls import Walls, ground_height
 from castblast.muckpile.results.movement import group_movement
+from castblast.types import FloatArray
 
 _BISECTIONS = 40
 

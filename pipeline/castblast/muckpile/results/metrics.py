@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from castblast.muckpile.balls.particles import FloatArray, IntArray, Particles, centre_of_mass
+from castblast.muckpile.balls.particles import Particles, centre_of_mass
 from castblast.muckpile.bench.geometry import Bench, bench_volume
 from castblast.muckpile.ground.walls import Walls, ground_height
 from castblast.muckpile.results.ballistic import ballistic_cast
@@ -27,6 +27,7 @@ from castblast.muckpile.results.profile import (
     repose_angle,
     surface_height,
 )
+from castblast.types import FloatArray, IntArray
 
 
 class PileMetrics(NamedTuple):

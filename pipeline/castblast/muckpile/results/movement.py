@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from castblast.muckpile.balls.particles import FloatArray, IntArray, Particles
+from castblast.muckpile.balls.particles import Particles
+from castblast.types import FloatArray, IntArray
 
 
 class GroupMovement(NamedTuple):

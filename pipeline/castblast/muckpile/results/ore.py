@@ -30,11 +30,11 @@ from math import inf, nan
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-from castblast.muckpile.balls.particles import FloatArray, IntArray, Particles, ball_mass
+from castblast.muckpile.balls.particles import Particles, ball_mass
 from castblast.muckpile.results.movement import GroupMovement, group_movement
 from castblast.muckpile.results.profile import mass_quantile
+from castblast.types import BoolArray, FloatArray, IntArray
 
 METHODS = ("as_planned", "translated", "outlined", "dig_blocks")
 WASTE = -1
@@ -178,7 +178,7 @@ def move_ore(
     ]
     mass = ball_mass(after.radius, density)
     blocks, dug_as = _dig_blocks(after.position, mass, owner, count, plan)
-    dug: dict[str, list[NDArray[np.bool_]]] = {
+    dug: dict[str, list[BoolArray]] = {
         "as_planned": [_inside(area, after.position) for area in planned],
         "translated": [_inside(area, after.position) for area in translated],
         "outlined": [_inside(area, after.position) for area in outlined],
@@ -192,7 +192,7 @@ def move_ore(
     return OreMovement(owner, movement, translated, outlined, blocks, results)
 
 
-def _inside(area: Area, position: FloatArray) -> NDArray[np.bool_]:
+def _inside(area: Area, position: FloatArray) -> BoolArray:
     """Whether each centre (n, 3) lies in `area` in plan."""
     import shapely
 
@@ -284,7 +284,7 @@ def _result(
     method: str,
     owner: IntArray,
     mass: FloatArray,
-    dug: NDArray[np.bool_],
+    dug: BoolArray,
 ) -> OreResult:
     own = owner == number
     total, taken = float(mass[own].sum()), float(mass[dug].sum())

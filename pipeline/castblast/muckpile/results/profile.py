@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from castblast.kernel import kernel
-from castblast.muckpile.balls.particles import FloatArray
 from castblast.muckpile.bench.geometry import Bench
+from castblast.types import FloatArray
 
 
 class HeightField(NamedTuple):

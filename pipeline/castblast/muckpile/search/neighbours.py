@@ -19,7 +19,7 @@ import numpy as np
 from numba import prange
 
 from castblast.kernel import inline_kernel, lean_kernel, parallel_kernel
-from castblast.muckpile.balls.particles import FloatArray, Int32Array, IntArray, RealArray
+from castblast.types import FloatArray, Int32Array, IntArray, RealArray
 
 #: Pieces into which passes over all balls are cut; fixed, so that sums do not depend on threads.
 PIECES = 32

@@ -13,10 +13,10 @@ from numba import prange
 from numpy.typing import NDArray
 
 from castblast.kernel import fused_kernel, inline_kernel, lean_kernel, parallel_kernel
-from castblast.muckpile.balls.particles import Int32Array, IntArray
 from castblast.muckpile.balls.state import starts
 from castblast.muckpile.search.neighbours import FINE, WIDE, Grid
 from castblast.muckpile.search.paths import LANES, Paths
+from castblast.types import BoolArray, Int32Array, IntArray
 
 #: Candidates of a ball that are collected before the close ones among them are written down.
 CANDIDATES = 256
@@ -61,7 +61,7 @@ def _keep_close(
     who: Int32Array,
     slab: int,
     count: int,
-    held: NDArray[np.bool_],
+    held: BoolArray,
     i: int,
     found: Int32Array,
     at: int,
@@ -85,7 +85,7 @@ def _keep_close(
 @lean_kernel
 def _search_slab(
     paths: Paths,
-    held: NDArray[np.bool_],
+    held: BoolArray,
     cell_start: Int32Array,
     grid: Grid,
     horizon: NDArray[np.float32],
@@ -128,7 +128,7 @@ def _search_slab(
 @parallel_kernel
 def _search_pairs(
     paths: Paths,
-    held: NDArray[np.bool_],
+    held: BoolArray,
     cell_start: Int32Array,
     grid: Grid,
     horizon: NDArray[np.float32],
@@ -163,7 +163,7 @@ def _close_ranks(found: Int32Array, room: IntArray, base: IntArray, partner: Int
 
 def list_pairs(
     paths: Paths,
-    held: NDArray[np.bool_],
+    held: BoolArray,
     cell_start: Int32Array,
     slab: IntArray,
     grid: Grid,

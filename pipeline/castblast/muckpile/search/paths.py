@@ -12,8 +12,8 @@ from numba import prange
 from numpy.typing import NDArray
 
 from castblast.kernel import parallel_kernel
-from castblast.muckpile.balls.particles import FloatArray, Int32Array, RealArray
 from castblast.muckpile.search.neighbours import PIECES
+from castblast.types import FloatArray, Int32Array, RealArray
 
 #: Paths axis by axis: centre (3) [m], velocity (3) [m s-1], radius with half of the skin [m].
 Paths: TypeAlias = NDArray[np.float32]

@@ -6,14 +6,13 @@ from math import sqrt
 
 import numpy as np
 from numba import prange
-from numpy.typing import NDArray
 
 from castblast.kernel import inline_kernel, lean_kernel, parallel_kernel
-from castblast.muckpile.balls.particles import Int32Array
 from castblast.muckpile.balls.state import starts
 from castblast.muckpile.ground.walls import WallTable, near_walls
 from castblast.muckpile.search.neighbours import PIECES
 from castblast.muckpile.search.paths import LANES, Paths
+from castblast.types import BoolArray, Int32Array
 
 
 @inline_kernel
@@ -36,7 +35,7 @@ def _search_walls(
 @lean_kernel
 def _count_piece(
     paths: Paths,
-    held: NDArray[np.bool_],
+    held: BoolArray,
     walls: WallTable,
     horizon: float,
     first: int,
@@ -52,7 +51,7 @@ def _count_piece(
 @parallel_kernel
 def _count_walls(
     paths: Paths,
-    held: NDArray[np.bool_],
+    held: BoolArray,
     walls: WallTable,
     horizon: float,
     number: Int32Array,
@@ -90,7 +89,7 @@ def _fill_walls(
 
 def list_walls(
     paths: Paths,
-    held: NDArray[np.bool_],
+    held: BoolArray,
     walls: WallTable,
     horizon: float,
 ) -> tuple[Int32Array, Int32Array]:

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from castblast.report.style import (
     BLUE,
@@ -20,9 +19,9 @@ from castblast.report.style import (
     save_figure,
     words,
 )
+from castblast.types import FloatArray
 
 Document = Mapping[str, Any]
-Floats = NDArray[np.float64]
 _MARK = {"color": "#222222", "linestyle": "--", "linewidth": 1.0}
 
 
@@ -145,5 +144,5 @@ def _formula(law: Document, trusted: bool) -> str:
     return f"{constant}c / n^{law['exponent']:.2f}{doubt}"
 
 
-def _percents(values: Sequence[float]) -> Floats:
+def _percents(values: Sequence[float]) -> FloatArray:
     return 100.0 * np.asarray(values, dtype=np.float64)

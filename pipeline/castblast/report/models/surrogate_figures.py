@@ -23,8 +23,8 @@ from castblast.report.style import (
     save_figure,
     words,
 )
+from castblast.types import FloatArray
 
-Floats = NDArray[np.float64]
 _MARK = {"color": "#222222", "linestyle": "--", "linewidth": 1.0}
 _PLATE = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
 _OTHER_TARGETS = (("s", "-"), ("^", "--"), ("D", "-."), ("v", ":"))
@@ -61,13 +61,13 @@ class HeldOutRows:
     by_explosive : mapping of explosive to such a mapping
     """
 
-    truth: Mapping[str, Floats]
-    predicted: Mapping[str, Floats]
+    truth: Mapping[str, FloatArray]
+    predicted: Mapping[str, FloatArray]
     explosive: NDArray[np.str_]
     scores: Mapping[str, Mapping[str, float]]
     by_explosive: Mapping[str, Mapping[str, Mapping[str, float]]]
 
-    def errors(self, target: str) -> Floats:
+    def errors(self, target: str) -> FloatArray:
         """Relative errors in percent, signed."""
         truth = self.truth[target]
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -154,7 +154,7 @@ def _draw_learning(
     axis.set_ylim(low / (high / low) ** 0.6, high)  # room for the legend
 
 
-def _percent(fractions: Sequence[float]) -> Floats:
+def _percent(fractions: Sequence[float]) -> FloatArray:
     return 100.0 * np.asarray(fractions, dtype=np.float64)
 
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from castblast.kernel import kernel
+from castblast.types import FloatArray
 
-Floats = NDArray[np.float64]
 # Light from the upper left, over the shoulder of the viewer: right, up, towards the viewer.
 _LIGHT = np.array([-0.45, 0.55, 0.70])
 _AMBIENT = 0.5
@@ -25,9 +25,9 @@ _FINER = 2  # pixels are averaged over squares of this side
 class View(NamedTuple):
     """Parallel view: unit vectors of the picture in space, rows right, up, towards the viewer."""
 
-    axes: Floats
+    axes: FloatArray
 
-    def project(self, position: Floats) -> Floats:
+    def project(self, position: FloatArray) -> FloatArray:
         """Picture coordinates (n, 3) [m] of points (n, 3): right, up, towards the viewer."""
         return np.ascontiguousarray(position @ self.axes.T)
 
@@ -79,7 +79,9 @@ class Canvas:
         self._depth = np.full(shape, -np.inf)
         self._colour = np.zeros((*shape, 3), dtype=np.float32)
 
-    def add(self, position: Floats, radius: Floats, colours: Floats, *, flat: bool = False) -> None:
+    def add(
+        self, position: FloatArray, radius: FloatArray, colours: FloatArray, *, flat: bool = False
+    ) -> None:
         """Paint balls.
 
         Parameters
@@ -123,13 +125,13 @@ class Canvas:
 
 @kernel
 def _paint(
-    place: Floats,
-    radius: Floats,
-    colour: Floats,
+    place: FloatArray,
+    radius: FloatArray,
+    colour: FloatArray,
     scale: float,
     ambient: float,
-    light: Floats,
-    depth: Floats,
+    light: FloatArray,
+    depth: FloatArray,
     picture: NDArray[np.float32],
 ) -> None:
     """Paint balls at `place` (n, 3), from the lower left corner, into depth and picture.
@@ -161,7 +163,7 @@ def _paint(
 
 @kernel
 def _shrink(
-    depth: Floats, picture: NDArray[np.float32], finer: int, image: NDArray[np.uint8]
+    depth: FloatArray, picture: NDArray[np.float32], finer: int, image: NDArray[np.uint8]
 ) -> None:
     """Average squares of `finer` pixels a side into colour and cover."""
     rows, columns, _ = image.shape

@@ -5,17 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from castblast.muckpile.bench.geometry import Bench, bench_outline
 from castblast.muckpile.bench.outline import FREE, OPEN, ROCK, section_at
 from castblast.report.piles.ground import INK
 from castblast.report.style import RED
+from castblast.types import FloatArray
 
-Floats = NDArray[np.float64]
 
-
-def bench_sections(bench: Bench, y: float) -> list[Floats]:
+def bench_sections(bench: Bench, y: float) -> list[FloatArray]:
     """Parts of the section of the bench at `y` [m]: rings (5, 2) of x and z [m]."""
     outline = bench_outline(bench)
     low = _crossings(section_at(outline, 0.0), y)
@@ -31,7 +29,7 @@ def bench_sections(bench: Bench, y: float) -> list[Floats]:
     ]  # fmt: skip
 
 
-def _crossings(corner: Floats, y: float) -> list[float]:
+def _crossings(corner: FloatArray, y: float) -> list[float]:
     """Places x, ascending, at which the line at `y` crosses a polygon (m, 2)."""
     after = np.roll(corner, -1, axis=0)
     # Half open: a corner on the line belongs to one of its edges; the last end is let in.

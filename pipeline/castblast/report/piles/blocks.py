@@ -1,4 +1,4 @@
-"""Colours of blocks and what the pictures of a muckpile have in common.
+"""FloatArray of blocks and what the pictures of a muckpile have in common.
 
 A ball keeps the colour of the place it came from, burden by spacing: the hue tells the row, counted
 from the face; neighbouring columns differ in lightness. So the colours are those of the blocks,
@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
 from castblast.muckpile.balls.particles import Particles
 from castblast.muckpile.bench.geometry import Bench, assign_blocks, block_shape
+from castblast.types import FloatArray, IntArray
 
-Colours = NDArray[np.float64]
 #: Width [inch] of a picture.
 WIDTH = 10.0
 _GREY = (0.62, 0.62, 0.62, 1.0)
@@ -25,12 +24,12 @@ _MARGIN = 0.03
 _SHOWN = 0.997  # share of the balls that a picture has to hold; single far rollers stretch it
 
 
-def origin_blocks(before: Particles, bench: Bench) -> NDArray[np.int64]:
+def origin_blocks(before: Particles, bench: Bench) -> IntArray:
     """Block of the grid (n,) that each ball lies in before the blast; -1: it is never fired."""
     return np.where(before.block >= 0, assign_blocks(before.position, bench), -1)
 
 
-def block_colours(block: NDArray[np.int64], bench: Bench) -> Colours:
+def block_colours(block: IntArray, bench: Bench) -> FloatArray:
     """RGBA (n, 4) of each ball: hue by row, lightness by column, grey without a block."""
     rows, columns = block_shape(bench)
     row, column = np.divmod(block, columns)
@@ -43,7 +42,7 @@ def block_colours(block: NDArray[np.int64], bench: Bench) -> Colours:
     return np.asarray(colours)
 
 
-def _row_palette(rows: int) -> Colours:
+def _row_palette(rows: int) -> FloatArray:
     share = np.linspace(0.08, 0.92, rows) if rows > 1 else np.array([0.3])
     return np.asarray(colormaps["viridis"](share), dtype=np.float64)
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from castblast.muckpile.ground.walls import Walls, ground_height
 from castblast.muckpile.results.profile import Profile
+from castblast.types import FloatArray
 
-Floats = NDArray[np.float64]
 EARTH, INK = "#DDD6CC", "#222222"
 _EARTH = np.array([0.867, 0.839, 0.800])
 _STEPS = 600
@@ -33,7 +32,7 @@ def draw_ground(axes: Any, ground: Profile, bottom: float) -> None:
 
 def ground_points(
     walls: Walls, x_range: tuple[float, float], y_range: tuple[float, float], spacing: float
-) -> tuple[Floats, Floats]:
+) -> tuple[FloatArray, FloatArray]:
     """Sample the ground as points (n, 3) [m] with colours (n, 3), light as by the sun.
 
     Where the height jumps, as at a bench face, points stand above each other without a gap.

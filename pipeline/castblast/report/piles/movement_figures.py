@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.collections import EllipseCollection, PatchCollection
 from matplotlib.patches import Patch, Rectangle
-from numpy.typing import NDArray
 
 from castblast.muckpile.balls.particles import Particles
 from castblast.muckpile.bench.geometry import Bench, block_shape
@@ -19,13 +18,13 @@ from castblast.report.piles.bench_lines import draw_bench_section, draw_faces
 from castblast.report.piles.blocks import WIDTH, origin_blocks, shown_range
 from castblast.report.piles.ground import INK, draw_ground, draw_ground_line
 from castblast.report.style import CYCLE, GREY, in_style, new_figure, save_figure
+from castblast.types import FloatArray, IntArray
 
 if TYPE_CHECKING:
     from castblast.muckpile.ground.walls import Walls
     from castblast.muckpile.results.ore import Area, OreMovement, OrePolygon
     from castblast.muckpile.results.profile import Profile
 
-Floats = NDArray[np.float64]
 LEVELS = 3
 _WASTE = (0.80, 0.80, 0.80)
 _METHOD_WORDS = {
@@ -95,9 +94,9 @@ def draw_movement(
 
 def _draw_vectors(
     axes: Any,
-    start: Floats,
-    way: Floats,
-    spread: Floats,
+    start: FloatArray,
+    way: FloatArray,
+    spread: FloatArray,
     seen: tuple[int, int],
     norm: Any = None,
 ) -> Any:
@@ -121,7 +120,7 @@ def _draw_vectors(
     )  # fmt: skip
 
 
-def _draw_block_lines(axes: Any, bench: Bench, balls: NDArray[np.int64]) -> None:
+def _draw_block_lines(axes: Any, bench: Bench, balls: IntArray) -> None:
     rows, columns = block_shape(bench)
     burden, spacing = bench.burden, bench.spacing
     boxes = [
@@ -142,7 +141,7 @@ def draw_profiles(
     bench: Bench,
     ground: Profile,
     *,
-    band: tuple[Profile, Floats] | None = None,
+    band: tuple[Profile, FloatArray] | None = None,
     band_words: str = "",
     title: str = "Surface of the muckpile",
 ) -> Path:
@@ -245,7 +244,7 @@ def draw_ore(
     return save_figure(figure, path, dpi=160)
 
 
-def _ore_colours(owner: NDArray[np.int64], colours: Sequence[str]) -> Floats:
+def _ore_colours(owner: IntArray, colours: Sequence[str]) -> FloatArray:
     from matplotlib.colors import to_rgb
 
     palette = np.array([*(to_rgb(colour) for colour in colours), _WASTE])

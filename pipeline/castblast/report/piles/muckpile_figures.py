@@ -17,7 +17,6 @@ from castblast.report.piles.ball_picture import PLAN_X, PLAN_Y, SECTION, Canvas
 from castblast.report.piles.bench_lines import draw_bench_section, draw_faces
 from castblast.report.piles.blocks import (
     WIDTH,
-    Colours,
     block_colours,
     block_legend,
     left_out_words,
@@ -26,6 +25,7 @@ from castblast.report.piles.blocks import (
 )
 from castblast.report.piles.ground import draw_ground_line
 from castblast.report.style import BLUE, GREEN, GREY, ORANGE, RED, in_style, new_figure, save_figure
+from castblast.types import FloatArray
 
 if TYPE_CHECKING:
     from castblast.muckpile.cast.solver import CastHistory, EnergyLedger
@@ -129,7 +129,7 @@ def _section_panels(count: int, limits: _Limits) -> tuple[Any, Any]:
 def _draw_cut(
     axes: Any,
     balls: Particles,
-    colours: Colours,
+    colours: FloatArray,
     bench: Bench,
     walls: Walls,
     y: float,

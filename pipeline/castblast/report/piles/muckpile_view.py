@@ -12,7 +12,6 @@ from castblast.muckpile.bench.geometry import Bench
 from castblast.report.piles.ball_picture import Canvas, oblique
 from castblast.report.piles.blocks import (
     WIDTH,
-    Colours,
     block_colours,
     block_legend,
     origin_blocks,
@@ -20,6 +19,7 @@ from castblast.report.piles.blocks import (
 )
 from castblast.report.piles.ground import INK, ground_points
 from castblast.report.style import in_style, new_figure, save_figure
+from castblast.types import FloatArray
 
 if TYPE_CHECKING:
     from castblast.muckpile.ground.walls import Walls
@@ -88,7 +88,7 @@ class Scene:
         self._spacing = 1.5 * (self.extent[1] - self.extent[0]) / pixels
         self._ground = ground_points(walls, x, y, self._spacing)
 
-    def canvas(self, balls: Particles, colours: Colours) -> Canvas:
+    def canvas(self, balls: Particles, colours: FloatArray) -> Canvas:
         """Paint ground and balls, in `colours` (n, 3 or 4)."""
         canvas = Canvas(self.view, self.extent, self.pixels)
         place, tones = self._ground

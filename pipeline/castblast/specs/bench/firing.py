@@ -8,11 +8,11 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from castblast.muckpile.balls.particles import FloatArray
 from castblast.muckpile.bench.geometry import Bench, block_shape
 from castblast.muckpile.bench.timing import echelon_delays, row_delays, v_delays
 from castblast.specs.loading import Spec
 from castblast.specs.quantity import QuantityError, QuantityIn
+from castblast.types import FloatArray
 
 _RIGHT_ANGLE = math.pi / 2.0
 _NO_HOLE = "a bearing or a dip is that of the hole, not of the throw: leave it out"

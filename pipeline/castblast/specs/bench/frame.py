@@ -7,10 +7,10 @@ from typing import Annotated
 
 import numpy as np
 
-from castblast.muckpile.balls.particles import FloatArray
 from castblast.muckpile.bench.geometry import Bench
 from castblast.specs.loading import Spec
 from castblast.specs.quantity import QuantityIn
+from castblast.types import FloatArray
 
 #: Of the directions of a pattern that are tried [rad].
 _STEP = math.radians(0.1)

@@ -11,7 +11,6 @@ import numpy as np
 
 from castblast.design.variables import INPUT_NAMES
 from castblast.errors import SpecError
-from castblast.muckpile.balls.particles import FloatArray, IntArray
 from castblast.muckpile.bench.geometry import Bench, assign_blocks, bench_outline, block_centres
 from castblast.muckpile.bench.outline import depth_inside
 from castblast.specs.bench.firing import THROW_AZIMUTH, THROW_ELEVATION
@@ -19,6 +18,7 @@ from castblast.specs.bench.frame import GRID_PLACE, FrameSpec, suggest_frame
 from castblast.specs.bench.tie_up import firing_times
 from castblast.specs.quantity import QuantityIn, VariableIn
 from castblast.specs.tables.table import ID_HEADS, Form, Table, read_table
+from castblast.types import FloatArray, IntArray
 
 _FROM_BENCH = ("bench_height", "face_angle")
 #: Two holes closer than this share of burden and spacing are one, where balls go to the nearest.

@@ -15,7 +15,6 @@ import numpy as np
 from pydantic import Field
 
 from castblast.errors import SpecError
-from castblast.muckpile.balls.particles import FloatArray
 from castblast.muckpile.bench.geometry import Bench
 from castblast.muckpile.results.ore import OrePolygon
 from castblast.specs.bench.frame import GRID_PLACE, FrameSpec
@@ -23,6 +22,7 @@ from castblast.specs.bench.place import extent, place_faults
 from castblast.specs.loading import Label, Spec, load_spec, make_spec
 from castblast.specs.quantity import QuantityIn
 from castblast.specs.tables.table import Form, read_table
+from castblast.types import FloatArray
 
 #: Grades are numbers in whatever unit the user thinks in, and as large as they like.
 _FORM = Form(

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from castblast.muckpile.balls.particles import FloatArray
 from castblast.muckpile.bench.geometry import Bench
+from castblast.types import FloatArray
 
 #: No rock of a bench flies this far [m], nor this many times the largest side of the bench.
 _OUT_OF_REACH, _OUT_OF_REACH_SIDES = 500.0, 10.0

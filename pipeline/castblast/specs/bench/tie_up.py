@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from castblast.errors import SpecError
-from castblast.muckpile.balls.particles import FloatArray
 from castblast.specs.tables.table import Table
+from castblast.types import FloatArray
 
 
 def firing_times(table: Table, from_hole: str, delay: str) -> FloatArray:

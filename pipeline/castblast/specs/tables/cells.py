@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from castblast.names import shortened
 from castblast.specs.quantity import QuantityError, convert
 from castblast.specs.tables.text import NUMBER
+from castblast.types import FloatArray
 
 MOST_FAULTS = 20
 _PLAIN = re.compile(r"[0-9eE+\-.\s]*", re.ASCII)
@@ -61,7 +61,7 @@ class NumberColumn:
     unit: str
     written: bool
     comma: bool
-    parts: list[NDArray[np.float64]] = field(default_factory=list)
+    parts: list[FloatArray] = field(default_factory=list)
     #: Some cell has a decimal point; rows and cells with a decimal comma, the first; some cell has
     #: no unit; rows read.
     points: bool = False
@@ -126,7 +126,7 @@ class NumberColumn:
         if len(self.commas) < MOST_FAULTS:
             self.commas.append((row, cell))
 
-    def values(self) -> NDArray[np.float64]:
+    def values(self) -> FloatArray:
         """All that was read, in the order of the rows."""
         return np.concatenate(self.parts) if self.parts else np.empty(0)
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from castblast.errors import SpecError
 from castblast.specs.quantity import QuantityError
@@ -20,6 +19,7 @@ from castblast.specs.tables.cells import Faults, NumberColumn, shown
 from castblast.specs.tables.heads import Form, Head, Rows, read_heads, with_unit_row
 from castblast.specs.tables.text import Sheet, open_sheet
 from castblast.specs.units import scaled, unit_factor
+from castblast.types import FloatArray, IntArray
 
 __all__ = ["ID_HEADS", "Form", "Table", "read_table", "table_of"]
 
@@ -50,8 +50,8 @@ class Table:
     """
 
     path: Path
-    line: NDArray[np.int64]
-    number: dict[str, NDArray[np.float64]]
+    line: IntArray
+    number: dict[str, FloatArray]
     text: dict[str, list[str]]
     unit: dict[str, str] = field(default_factory=dict)
     label: list[str] = field(default_factory=list)

@@ -18,7 +18,7 @@ from castblast.dataset.file.failures import require_success, summary
 from castblast.dataset.file.provenance import Parent, made_from, rows_hash
 from castblast.dataset.rows.design import Design, extend_design, join_designs
 from castblast.dataset.rows.design_file import design_of_rows, read_design_file, rows_sha256
-from castblast.dataset.rows.simulation import FloatArray, Simulator, blast_simulator
+from castblast.dataset.rows.simulation import Simulator, blast_simulator
 from castblast.errors import SpecError
 from castblast.progress import ProgressCallback, silent
 from castblast.specs.recipe import Recipe
@@ -28,6 +28,7 @@ from castblast.stages.datasets.generate import (
     finish,
     output_path,
 )
+from castblast.types import FloatArray
 
 
 @dataclass(frozen=True)

@@ -16,11 +16,12 @@ from castblast.dataset.rows.design_file import write_design_file
 from castblast.dataset.rows.simulation import blast_simulator
 from castblast.disk.resources import is_bare_name
 from castblast.errors import SpecError
-from castblast.network import Floats, Network, explosive_index, member_spread
+from castblast.network import Network, explosive_index, member_spread
 from castblast.progress import ProgressCallback, part, silent
 from castblast.specs.models.model import ModelSpec, make_model_spec, read_model_spec, refuse_code
 from castblast.specs.recipe import Recipe
 from castblast.surrogate.searching.infill import POOL_FACTOR, choose_batch, infill_worth
+from castblast.types import FloatArray
 
 #: Batch numbers from here on are for pools: no dataset gets that far, so a later extension never
 #: draws the numbers of a pool again.
@@ -102,7 +103,7 @@ def infill(
     return _outcome(dataset, out, targets, np.median(spread, axis=0), spread[chosen])
 
 
-def shares_of(recipe: Recipe, columns: Mapping[str, Floats]) -> Floats:
+def shares_of(recipe: Recipe, columns: Mapping[str, FloatArray]) -> FloatArray:
     """Place of each row in the range of each sampled variable, (n, k) between 0 and 1."""
     shares = []
     for spec in recipe.sampled:
@@ -123,7 +124,7 @@ def _spread(
     labels: list[str],
     members: int,
     progress: ProgressCallback,
-) -> tuple[tuple[str, ...], Floats]:
+) -> tuple[tuple[str, ...], FloatArray]:
     """Targets, and relative spread of the ensemble for every row of the pool."""
     if isinstance(found, Network):
         numeric = np.stack([pool.inputs[name] for name in found.input_names], axis=1)
@@ -160,7 +161,7 @@ def _find_model(model: Path) -> Network | ModelSpec:
 
 
 def _outcome(
-    dataset: Path, out: Path, targets: tuple[str, ...], usual: Floats, spread: Floats
+    dataset: Path, out: Path, targets: tuple[str, ...], usual: FloatArray, spread: FloatArray
 ) -> InfillOutcome:
     """Say how much wider the spread is where the new rows lie."""
     medians = np.median(spread, axis=0)

@@ -10,11 +10,11 @@ import numpy as np
 
 from castblast.disk.reading import read_json, read_text
 from castblast.errors import SpecError
-from castblast.muckpile.balls.particles import FloatArray
 from castblast.muckpile.bench.geometry import Bench, check_bench
 from castblast.muckpile.results.metrics import UNITS
 from castblast.muckpile.results.profile import Profile
 from castblast.stages.muckpile.tables import GROUND_COLUMN, MEAN_COLUMN, X_COLUMN
+from castblast.types import FloatArray
 
 _METRICS, _PROFILE = "metrics.json", "profile.csv"
 #: A file of metrics of 100,000 blocks stays below it [bytes].

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from castblast.muckpile.balls.particles import FloatArray, Particles
+from castblast.muckpile.balls.particles import Particles
 from castblast.muckpile.bench.geometry import Bench, assign_blocks, block_shape
 from castblast.muckpile.cast.case import CastCase, CastHistory
 from castblast.muckpile.ground.walls import Walls, ground_height
@@ -19,6 +19,7 @@ from castblast.muckpile.results.profile import (
     section_band,
     surface_height,
 )
+from castblast.types import FloatArray
 
 X_COLUMN, MEAN_COLUMN, GROUND_COLUMN = "x [m]", "mean_height [m]", "ground [m]"
 #: Shares of the length of the bench at which sections are cut, besides the mean.

@@ -8,9 +8,9 @@ import numpy as np
 
 from castblast.design.variables import VARIABLES
 from castblast.errors import DatasetError
-from castblast.network import Floats
 from castblast.specs.models.model import ModelSpec
 from castblast.surrogate.fitting.features import Table
+from castblast.types import FloatArray
 
 #: A sum of inputs that moves by no more than this share of its terms is held: the rest is rounding.
 _ROUNDING = 1e-12
@@ -98,6 +98,6 @@ def check_positive(
         raise DatasetError("\n".join(faults))
 
 
-def _terms(table: Table, coefficients: Mapping[str, float]) -> Floats:
+def _terms(table: Table, coefficients: Mapping[str, float]) -> FloatArray:
     """Terms of a sum of features, (k, n)."""
     return np.stack([c * table.frame[name].to_numpy() for name, c in coefficients.items()])

@@ -15,9 +15,10 @@ from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import FunctionTransformer, OneHotEncoder, StandardScaler
 
 from castblast.errors import DatasetError
-from castblast.network import DerivedColumn, Floats, Transform
+from castblast.network import DerivedColumn, Transform
 from castblast.specs.models.model import SurrogateSpec
 from castblast.surrogate.fitting.features import Table
+from castblast.types import FloatArray
 
 
 def make_columns(spec: SurrogateSpec, table: Table) -> Any:
@@ -49,7 +50,7 @@ def make_scaler(transforms: Sequence[Transform]) -> Any:
     return Pipeline([*([("log", log)] if any(logged) else []), ("scale", StandardScaler())])
 
 
-def log_some(values: Any, logged: Sequence[bool]) -> Floats:
+def log_some(values: Any, logged: Sequence[bool]) -> FloatArray:
     """Natural logarithm of the columns that are to be logged."""
     x = np.array(values, dtype=np.float64)
     chosen = np.array(logged)
@@ -57,7 +58,7 @@ def log_some(values: Any, logged: Sequence[bool]) -> Floats:
     return x
 
 
-def exp_some(values: Any, logged: Sequence[bool]) -> Floats:
+def exp_some(values: Any, logged: Sequence[bool]) -> FloatArray:
     """Inverse of `log_some`."""
     x = np.array(values, dtype=np.float64)
     chosen = np.array(logged)
@@ -65,13 +66,13 @@ def exp_some(values: Any, logged: Sequence[bool]) -> Floats:
     return x
 
 
-def linear_sums(values: Any, matrix: Floats) -> Floats:
+def linear_sums(values: Any, matrix: FloatArray) -> FloatArray:
     """Derived columns: values (n, k) times coefficients (k, d)."""
-    sums: Floats = np.asarray(values, dtype=np.float64) @ matrix
+    sums: FloatArray = np.asarray(values, dtype=np.float64) @ matrix
     return sums
 
 
-def sums_matrix(spec: SurrogateSpec) -> Floats:
+def sums_matrix(spec: SurrogateSpec) -> FloatArray:
     """Coefficients (k, d) of the derived columns."""
     return np.array(
         [
@@ -100,7 +101,7 @@ def derived_columns(spec: SurrogateSpec, columns: Any) -> tuple[DerivedColumn, .
     )
 
 
-def explosive_codes(columns: Any, explosives: Sequence[str]) -> Floats:
+def explosive_codes(columns: Any, explosives: Sequence[str]) -> FloatArray:
     """What enters a model for each explosive, (len(explosives), c)."""
     encoder = columns.named_transformers_["explosive"]
     if isinstance(encoder, DescriptorEncoder):
@@ -156,9 +157,9 @@ class DescriptorEncoder(TransformerMixin, BaseEstimator):  # type: ignore[misc]
         self.n_features_in_ = 1
         return self
 
-    def transform(self, values: Any) -> Floats:
+    def transform(self, values: Any) -> FloatArray:
         """Rows (n, 1) of names to rows (n, c) of numbers."""
         names = np.asarray(values, dtype=object).ravel()
         index = {name: k for k, name in enumerate(self.names)}
-        codes: Floats = np.array(self.codes, dtype=np.float64)[[index[name] for name in names]]
+        codes: FloatArray = np.array(self.codes, dtype=np.float64)[[index[name] for name in names]]
         return codes

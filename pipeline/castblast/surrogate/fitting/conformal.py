@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from castblast.errors import DatasetError
-from castblast.network import Floats
+from castblast.types import FloatArray
 
 #: Share of new truths that a band is to hold.
 LEVEL = 0.95
@@ -36,7 +36,7 @@ class Coverage(NamedTuple):
     rows: int
 
 
-def conformal_band(truth: Floats, predicted: Floats, level: float = LEVEL) -> Floats:
+def conformal_band(truth: FloatArray, predicted: FloatArray, level: float = LEVEL) -> FloatArray:
     """Split-conformal band relative to the prediction, per target.
 
     Parameters
@@ -75,7 +75,7 @@ def conformal_band(truth: Floats, predicted: Floats, level: float = LEVEL) -> Fl
     return np.array([_half_width(column, level) for column in residuals.T])
 
 
-def _half_width(residuals: Floats, level: float) -> float:
+def _half_width(residuals: FloatArray, level: float) -> float:
     """Half-width of the interval about 0 that MAPIE makes of residuals (n,)."""
     from mapie.regression import SplitConformalRegressor
     from sklearn.dummy import DummyRegressor
@@ -87,7 +87,7 @@ def _half_width(residuals: Floats, level: float) -> float:
     return float(interval[0, 1, 0])
 
 
-def band_coverage(truth: Floats, predicted: Floats, band: Floats) -> list[Coverage]:
+def band_coverage(truth: FloatArray, predicted: FloatArray, band: FloatArray) -> list[Coverage]:
     """Measure on rows (n, m) how many truths lie in predicted x (1 -+ band), per target."""
     from scipy.stats import binomtest
 

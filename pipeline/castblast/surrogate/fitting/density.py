@@ -15,8 +15,9 @@ from typing import TypeVar
 
 import numpy as np
 
-from castblast.network import DensityScore, Floats, Shell, scale_columns
+from castblast.network import DensityScore, Shell, scale_columns
 from castblast.surrogate.fitting.features import Table
+from castblast.types import FloatArray
 
 #: Share of rows of the training distribution that are to count as inside.
 LEVEL = 0.995
@@ -38,7 +39,7 @@ def with_density(shell: _AnyShell, table: Table) -> _AnyShell:
 
 
 def fit_density(
-    train: Floats, held: Floats, terms: int | None = None, seed: int = 0
+    train: FloatArray, held: FloatArray, terms: int | None = None, seed: int = 0
 ) -> DensityScore:
     """Fit the score and its bound.
 

@@ -18,7 +18,6 @@ from castblast.design.variables import VARIABLES
 from castblast.network import (
     Column,
     DerivedColumn,
-    Floats,
     GoldenRows,
     InputColumn,
     Layer,
@@ -29,6 +28,7 @@ from castblast.network import (
 from castblast.specs.models.model import MlpSpec, ModelSpec
 from castblast.surrogate.fitting.families.build import make_model
 from castblast.surrogate.fitting.features import Table, domain_constraints, input_columns
+from castblast.types import FloatArray
 
 _GOLDEN_ROWS = 200
 _GOLDEN_CORNERS = 64
@@ -67,7 +67,7 @@ def fit_estimator(
     estimator: Any,
     spec: ModelSpec,
     frame: Any,
-    targets: Floats,
+    targets: FloatArray,
     watch: Callable[[Any], None] | None = None,
 ) -> tuple[int, bool]:
     """Fit in place on one BLAS thread: with such small matrices a second one slows the fit down.
@@ -116,8 +116,8 @@ def fit_estimator(
 
 
 def _model_watch(
-    estimator: Any, frame: Any, targets: Floats, watch: Callable[[Any], None]
-) -> Callable[[Callable[[Floats], Floats]], None]:
+    estimator: Any, frame: Any, targets: FloatArray, watch: Callable[[Any], None]
+) -> Callable[[Callable[[FloatArray], FloatArray]], None]:
     """Turn a watch of whole estimators into one of what stands inside the scalings."""
     from sklearn.base import clone
 
@@ -127,11 +127,11 @@ def _model_watch(
     class Partial:
         """The estimator as far as its model is fitted."""
 
-        def __init__(self, inner: Callable[[Floats], Floats]) -> None:
+        def __init__(self, inner: Callable[[FloatArray], FloatArray]) -> None:
             self.inner = inner
 
-        def predict(self, rows: Any) -> Floats:
-            values: Floats = scaler.inverse_transform(self.inner(columns.transform(rows)))
+        def predict(self, rows: Any) -> FloatArray:
+            values: FloatArray = scaler.inverse_transform(self.inner(columns.transform(rows)))
             return values
 
     return lambda inner: watch(Partial(inner))
@@ -144,7 +144,7 @@ def _unwatch(estimator: Any) -> None:
             pipeline.set_params(model__watch=None)
 
 
-def _refine(model: Any, features: Floats, scaled: Floats, spread: float) -> int:
+def _refine(model: Any, features: FloatArray, scaled: FloatArray, spread: float) -> int:
     """Go on from the weights of `model` with targets `spread` times as large; iterations taken.
 
     The last layer is linear, so scaling it scales the outputs; it is scaled back at the end.
@@ -159,7 +159,7 @@ def _refine(model: Any, features: Floats, scaled: Floats, spread: float) -> int:
     return int(model.n_iter_)
 
 
-def predict(estimator: Any, frame: Any) -> Floats:
+def predict(estimator: Any, frame: Any) -> FloatArray:
     """Evaluate a fitted estimator: (n, m) in SI, on one BLAS thread."""
     from threadpoolctl import threadpool_limits
 
@@ -180,7 +180,7 @@ def is_torch_model(model: Any) -> bool:
 
 
 def to_network(
-    estimator: Any, spec: ModelSpec, table: Table, band: Floats, provenance: Mapping[str, Any]
+    estimator: Any, spec: ModelSpec, table: Table, band: FloatArray, provenance: Mapping[str, Any]
 ) -> Network | None:
     """Turn a fitted estimator into the neutral record; parameters as `to_shell`.
 
@@ -198,7 +198,7 @@ def to_network(
 
 
 def to_shell(
-    estimator: Any, spec: ModelSpec, table: Table, band: Floats, provenance: Mapping[str, Any]
+    estimator: Any, spec: ModelSpec, table: Table, band: FloatArray, provenance: Mapping[str, Any]
 ) -> Shell:
     """Everything of the neutral record but the layers, for a model of any shape.
 
@@ -283,7 +283,7 @@ def golden_rows(
 
 
 def _can_be_logged(
-    rows: Floats, inputs: Sequence[InputColumn], derived: Sequence[DerivedColumn]
+    rows: FloatArray, inputs: Sequence[InputColumn], derived: Sequence[DerivedColumn]
 ) -> Any:
     good = np.ones(len(rows), dtype=bool)
     for column in derived:
@@ -301,7 +301,7 @@ def _names(columns: Sequence[Column]) -> list[str]:
     return [column.name for column in columns]
 
 
-def _corners(dimensions: int, rng: np.random.Generator) -> Floats:
+def _corners(dimensions: int, rng: np.random.Generator) -> FloatArray:
     """Corners of the unit box, (c, dimensions): all of them, or a random choice where too many."""
     if 2**dimensions <= _GOLDEN_CORNERS:
         return np.array(list(product((0.0, 1.0), repeat=dimensions)))

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from castblast.dataset.file.schema import flag_names
 from castblast.design.variables import INPUT_NAMES, VARIABLES
 from castblast.errors import DatasetError, nearest_name
-from castblast.network import Constraint, Floats, InputColumn, Transform
+from castblast.network import Constraint, InputColumn, Transform
 from castblast.specs.models.model import ALL_FEATURES
+from castblast.types import FloatArray, IntArray
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -80,10 +81,10 @@ class Table:
     """
 
     frame: pd.DataFrame
-    targets: Floats
+    targets: FloatArray
     target_names: tuple[str, ...]
     explosives: tuple[str, ...]
-    sample: NDArray[np.int64]
+    sample: IntArray
     split: NDArray[np.str_]
     source: Mapping[str, str]
     held: Mapping[str, float]
@@ -95,7 +96,7 @@ class Table:
         """Names of the numeric features."""
         return tuple(name for name in self.frame.columns if name != "explosive")
 
-    def rows(self, *splits: Split) -> NDArray[np.int64]:
+    def rows(self, *splits: Split) -> IntArray:
         """Positions of the rows of the given splits, in order."""
         return np.flatnonzero(np.isin(self.split, splits)).astype(np.int64)
 
@@ -272,7 +273,7 @@ def _faults(table: Table, dropped: int) -> list[str]:
 
 
 def input_columns(
-    table: Table, transforms: Sequence[Transform], mean: Floats, scale: Floats
+    table: Table, transforms: Sequence[Transform], mean: FloatArray, scale: FloatArray
 ) -> tuple[InputColumn, ...]:
     """Describe the numeric features with their scaling and the range of the training rows."""
     train = table.frame.iloc[table.rows("train")]
@@ -296,7 +297,7 @@ def input_columns(
     return tuple(columns)
 
 
-def _trained_range(values: Floats) -> tuple[float, float]:
+def _trained_range(values: FloatArray) -> tuple[float, float]:
     """Range of values with five strata of their design outwards, never across 0.
 
     The samples of a Latin hypercube keep off the ends of the range they are drawn from, and some of

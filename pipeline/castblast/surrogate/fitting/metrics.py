@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.network import Floats
+from castblast.types import FloatArray
 
 #: Bound on the relative error whose share is reported.
 WITHIN = 0.025
@@ -47,29 +47,29 @@ class Score(NamedTuple):
         }
 
 
-def relative_errors(truth: Floats, predicted: Floats) -> Floats:
+def relative_errors(truth: FloatArray, predicted: FloatArray) -> FloatArray:
     """(predicted - truth) / truth, signed; infinite where a truth of 0 is missed."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        errors: Floats = np.where(predicted == truth, 0.0, (predicted - truth) / np.abs(truth))
+        errors: FloatArray = np.where(predicted == truth, 0.0, (predicted - truth) / np.abs(truth))
     return errors
 
 
-def r_squared(truth: Floats, predicted: Floats) -> Floats:
+def r_squared(truth: FloatArray, predicted: FloatArray) -> FloatArray:
     """1 - residual / total sum of squares along the first axis; (n, ...) to (...)."""
     residual = np.sum((truth - predicted) ** 2, axis=0)
     total = np.sum((truth - truth.mean(axis=0)) ** 2, axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        result: Floats = np.asarray(1.0 - residual / total)
+        result: FloatArray = np.asarray(1.0 - residual / total)
     return result
 
 
-def error_quantile(truth: Floats, predicted: Floats) -> Floats:
+def error_quantile(truth: FloatArray, predicted: FloatArray) -> FloatArray:
     """Absolute relative error that `LEVEL` of the rows do not exceed, along the first axis."""
     errors = np.abs(relative_errors(truth, predicted))
     return np.asarray(np.quantile(errors, LEVEL, axis=0, method="inverted_cdf"))
 
 
-def score(truth: Floats, predicted: Floats) -> Score:
+def score(truth: FloatArray, predicted: FloatArray) -> Score:
     """Score one target; truth and predicted (n,) in the same unit, n at least 2."""
     errors = np.abs(relative_errors(truth, predicted))
     return Score(
@@ -80,13 +80,15 @@ def score(truth: Floats, predicted: Floats) -> Score:
     )
 
 
-def score_targets(truth: Floats, predicted: Floats, names: Sequence[str]) -> dict[str, Score]:
+def score_targets(
+    truth: FloatArray, predicted: FloatArray, names: Sequence[str]
+) -> dict[str, Score]:
     """Score every target; truth and predicted (n, m)."""
     return {name: score(truth[:, j], predicted[:, j]) for j, name in enumerate(names)}
 
 
 def score_by_explosive(
-    truth: Floats, predicted: Floats, names: Sequence[str], explosive: NDArray[np.str_]
+    truth: FloatArray, predicted: FloatArray, names: Sequence[str], explosive: NDArray[np.str_]
 ) -> dict[str, dict[str, Score]]:
     """Score every target on the rows of each explosive: explosive -> target -> score."""
     return {

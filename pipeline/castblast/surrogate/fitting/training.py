@@ -11,7 +11,7 @@ import numpy as np
 
 from castblast import __version__
 from castblast.errors import SpecError
-from castblast.network import Floats, Network, Shell
+from castblast.network import Network, Shell
 from castblast.progress import ProgressCallback, silent
 from castblast.specs.models.model import ModelSpec
 from castblast.surrogate.fitting import estimators
@@ -25,6 +25,7 @@ from castblast.surrogate.fitting.metrics import (
     score_targets,
     summary_error,
 )
+from castblast.types import FloatArray
 
 
 class Restart(NamedTuple):
@@ -73,8 +74,8 @@ class Fit:
     estimator: Any
     network: Network | None
     table: Table
-    predicted: Floats
-    band: Floats
+    predicted: FloatArray
+    band: FloatArray
     restarts: tuple[Restart, ...]
     chosen: int
     seconds: float
@@ -180,12 +181,12 @@ def fit_spec(
 
 def _run(
     spec: ModelSpec, table: Table, seed: int, report: Callable[[float], None] | None
-) -> tuple[Any, Restart, Floats]:
+) -> tuple[Any, Restart, FloatArray]:
     """One fit from one seed, with its predictions for every row."""
     train, valid = table.rows("train"), table.rows("valid")
     estimator = estimators.make_estimator(spec, table, seed)
 
-    def valid_error(values: Floats) -> float:
+    def valid_error(values: FloatArray) -> float:
         scores = score_targets(table.targets[valid], values, table.target_names)
         return summary_error(scores)
 
@@ -208,7 +209,7 @@ def _run(
 
 
 def _provenance(
-    spec: ModelSpec, table: Table, predicted: Floats, band: Floats, restart: Restart
+    spec: ModelSpec, table: Table, predicted: FloatArray, band: FloatArray, restart: Restart
 ) -> dict[str, Any]:
     """What made this model and how good it is; no times, no paths."""
     names = table.target_names

@@ -13,12 +13,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from castblast.errors import SpecError
-from castblast.network import Floats
 from castblast.surrogate.fitting.metrics import WITHIN, error_quantile, r_squared, score
 from castblast.surrogate.fitting.training import Fit
+from castblast.types import FloatArray, IntArray
 
 #: Published figures of the 3 x 7 network for burden velocity, from 10,000 runs.
 PAPER_MARKS: Mapping[str, float] = {"r2": 0.9997, "relative_error_95": 0.025, "runs": 10000}
@@ -120,24 +119,24 @@ def _common_targets(fits: Sequence[Fit]) -> tuple[str, ...]:
     return targets
 
 
-def _columns(fit: Fit, target: str) -> tuple[Floats, Floats]:
+def _columns(fit: Fit, target: str) -> tuple[FloatArray, FloatArray]:
     """Truth and prediction of one target on the test rows."""
     rows, j = fit.table.rows("test"), fit.table.target_names.index(target)
     return fit.table.targets[rows, j], fit.predicted[rows, j]
 
 
-def _summary_draws(fit: Fit, targets: Sequence[str], draws: NDArray[np.int64]) -> Floats:
+def _summary_draws(fit: Fit, targets: Sequence[str], draws: IntArray) -> FloatArray:
     """Logarithm of the summary error on every bootstrap draw, (b,)."""
     logs = []
     for target in targets:
         truth, predicted = _columns(fit, target)
         quantiles = error_quantile(truth[draws].T, predicted[draws].T)
         logs.append(np.log(np.maximum(quantiles, np.finfo(float).tiny)))
-    mean: Floats = np.mean(logs, axis=0)
+    mean: FloatArray = np.mean(logs, axis=0)
     return mean
 
 
-def _distinguishable(mine: Floats, theirs: Floats) -> bool:
+def _distinguishable(mine: FloatArray, theirs: FloatArray) -> bool:
     """Whether the bootstrap interval of the difference of two summary errors excludes 0."""
     low, high = np.quantile(mine - theirs, (0.025, 0.975))
     return bool(low > 0.0 or high < 0.0)
@@ -146,7 +145,7 @@ def _distinguishable(mine: Floats, theirs: Floats) -> bool:
 def _entry(
     fit: Fit,
     targets: Sequence[str],
-    draws: NDArray[np.int64],
+    draws: IntArray,
     alike: Sequence[str],
     first: str,
     gate: Mapping[str, Any] | None,
@@ -178,7 +177,7 @@ def _point(fit: Fit, targets: Sequence[str]) -> float:
     return float(_summary_draws(fit, targets, every)[0])
 
 
-def _target_entry(fit: Fit, target: str, draws: NDArray[np.int64]) -> dict[str, Any]:
+def _target_entry(fit: Fit, target: str, draws: IntArray) -> dict[str, Any]:
     truth, predicted = _columns(fit, target)
     point = score(truth, predicted)
     r2 = np.quantile(r_squared(truth[draws].T, predicted[draws].T), (0.025, 0.975))

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from castblast.dataset.file.provenance import stored_explosives
 from castblast.dataset.rows.simulation import Simulator, blast_simulator
 from castblast.errors import DatasetError
-from castblast.network import Floats
 from castblast.specs.recipe import Recipe, VariableSpec, recipe_from_text
+from castblast.types import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,16 +44,16 @@ class Points(NamedTuple):
         Place in the unit box: quantile of each sampled variable of the recipe, in its order.
     """
 
-    inputs: dict[str, Floats]
-    explosive: NDArray[np.int64]
-    shares: Floats
+    inputs: dict[str, FloatArray]
+    explosive: IntArray
+    shares: FloatArray
 
     @property
     def size(self) -> int:
         """Number of points."""
         return len(self.explosive)
 
-    def take(self, rows: NDArray[np.integer] | NDArray[np.bool_]) -> Points:
+    def take(self, rows: NDArray[np.integer] | BoolArray) -> Points:
         """Give some of the points."""
         inputs = {name: values[rows] for name, values in self.inputs.items()}
         return Points(inputs, self.explosive[rows], self.shares[rows])
@@ -76,14 +76,14 @@ class Domain:
     recipe: Recipe
     simulator: Simulator
     explosives: tuple[str, ...]
-    energy: Floats
+    energy: FloatArray
 
     @property
     def sampled(self) -> tuple[str, ...]:
         """Names of the variables that the recipe varies."""
         return tuple(spec.name for spec in self.recipe.sampled)
 
-    def points(self, shares: Floats, explosive: NDArray[np.integer]) -> Points:
+    def points(self, shares: FloatArray, explosive: NDArray[np.integer]) -> Points:
         """Map possible places of the unit box (n, d), see `possible`, to inputs.
 
         Raises
@@ -93,7 +93,7 @@ class Domain:
         """
         return self._resolved(self._raw(shares), explosive, shares)
 
-    def possible(self, shares: Floats) -> NDArray[np.bool_]:
+    def possible(self, shares: FloatArray) -> BoolArray:
         """Tell which places of the unit box (n, d) belong to the domain."""
         return self._allowed(self._raw(shares))
 
@@ -108,7 +108,7 @@ class Domain:
         from scipy.stats import qmc
 
         sampler = qmc.Sobol(len(self.recipe.sampled) + 1, rng=np.random.default_rng(seed))
-        kept: list[Floats] = []
+        kept: list[FloatArray] = []
         found = 0
         for _ in range(_MOST_BATCHES):
             shares = sampler.random(_BATCH)
@@ -131,14 +131,12 @@ class Domain:
         names = np.array(self.explosives, dtype=object)[points.explosive]
         return pd.DataFrame(columns).assign(explosive=names)
 
-    def simulate(self, points: Points, outputs: Sequence[str]) -> Floats:
+    def simulate(self, points: Points, outputs: Sequence[str]) -> FloatArray:
         """Run the physics: (n, m) [SI], NaN in rows that failed."""
         result = self.simulator.run(points.inputs, points.explosive).outputs
         return np.stack([result[name] for name in outputs], axis=1)
 
-    def moved(
-        self, points: Points, changes: Mapping[str, Floats]
-    ) -> tuple[Points, NDArray[np.bool_]]:
+    def moved(self, points: Points, changes: Mapping[str, FloatArray]) -> tuple[Points, BoolArray]:
         """Change some inputs and keep every other variable of the recipe at its value.
 
         A variable that the recipe holds at a ratio follows its base; what is derived follows too.
@@ -167,7 +165,7 @@ class Domain:
         raw = {name: np.where(inside, values, held[name]) for name, values in raw.items()}
         return self._resolved(raw, points.explosive, points.shares), inside
 
-    def _raw(self, shares: Floats) -> dict[str, Floats]:
+    def _raw(self, shares: FloatArray) -> dict[str, FloatArray]:
         """Variables of the recipe at places of the unit box."""
         recipe = self.recipe
         raw = {spec.name: _quantiles(spec, shares[:, j]) for j, spec in enumerate(recipe.sampled)}
@@ -178,12 +176,12 @@ class Domain:
         return raw
 
     def _resolved(
-        self, raw: Mapping[str, Floats], explosive: NDArray[np.integer], shares: Floats
+        self, raw: Mapping[str, FloatArray], explosive: NDArray[np.integer], shares: FloatArray
     ) -> Points:
         inputs = self.simulator.resolve(raw, explosive)
         return Points(dict(inputs), np.asarray(explosive, dtype=np.int64), shares)
 
-    def _in_ranges(self, raw: Mapping[str, Floats]) -> NDArray[np.bool_]:
+    def _in_ranges(self, raw: Mapping[str, FloatArray]) -> BoolArray:
         """Rows whose sampled variables lie between the bounds of the recipe."""
         inside = np.ones(len(next(iter(raw.values()))), dtype=bool)
         for spec in self.recipe.sampled:
@@ -194,9 +192,9 @@ class Domain:
             inside &= (values >= spec.at(0.0) - slack) & (values <= spec.at(1.0) + slack)
         return inside
 
-    def _allowed(self, raw: Mapping[str, Floats]) -> NDArray[np.bool_]:
+    def _allowed(self, raw: Mapping[str, FloatArray]) -> BoolArray:
         """Rows that a bench can hold and no constraint of the recipe refuses."""
-        allowed: NDArray[np.bool_] = np.array(self.simulator.possible(raw))
+        allowed: BoolArray = np.array(self.simulator.possible(raw))
         rows = np.flatnonzero(allowed)
         some = {name: values[rows] for name, values in raw.items()}
         inputs = self.simulator.resolve(some, np.zeros(len(rows), dtype=np.int64))
@@ -230,7 +228,7 @@ def dataset_domain(dataset: xr.Dataset, where: str = "dataset") -> Domain:
     return Domain(recipe, blast_simulator(recipe, explosives), tuple(stored), energy)
 
 
-def _quantiles(spec: VariableSpec, shares: Floats) -> Floats:
+def _quantiles(spec: VariableSpec, shares: FloatArray) -> FloatArray:
     """Marginal of a sampled variable at the shares (n,)."""
     low, high = spec.at(0.0), spec.at(1.0)
     if spec.distribution == "log_uniform":

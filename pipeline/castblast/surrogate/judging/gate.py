@@ -18,14 +18,14 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from castblast.design.variables import VARIABLES
-from castblast.network import Floats
 from castblast.surrogate.fitting import estimators
 from castblast.surrogate.fitting.training import Fit
 from castblast.surrogate.judging.domain import Domain, Points
 from castblast.surrogate.judging.probe import VELOCITY, Pairs, Probe
+from castblast.types import FloatArray
 
 #: Frame of features and ``explosive`` to targets (n, m), SI.
-Predict: TypeAlias = Callable[[Any], Floats]
+Predict: TypeAlias = Callable[[Any], FloatArray]
 
 #: Answers beyond the simulated range by this share of its logarithmic width blow up between the
 #: rows; the few simulated points do not reach the very ends of the domain.
@@ -54,7 +54,7 @@ class Surrogate(NamedTuple):
     features: Sequence[str]
     targets: Sequence[str]
 
-    def answers(self, domain: Domain, points: Points) -> dict[str, Floats]:
+    def answers(self, domain: Domain, points: Points) -> dict[str, FloatArray]:
         """Predictions by target at points of a domain, in blocks."""
         frame = domain.frame(points, self.features)
         blocks = [frame.iloc[i : i + _CHUNK] for i in range(0, len(frame), _CHUNK)]
@@ -76,7 +76,7 @@ class _Rule(NamedTuple):
 
     name: str
     say: str
-    margin: Floats
+    margin: FloatArray
 
 
 def check_physics(fit: Fit | Surrogate, probe: Probe) -> dict[str, Any]:
@@ -123,7 +123,7 @@ def _rule_checks(surrogate: Surrogate, probe: Probe) -> Iterator[dict[str, Any]]
 
 
 def _rules(
-    answers: Mapping[str, Floats], domain: Domain, points: Points, probe: Probe
+    answers: Mapping[str, FloatArray], domain: Domain, points: Points, probe: Probe
 ) -> Iterator[_Rule]:
     inputs, radius = points.inputs, 0.5 * points.inputs["hole_diameter"]
     for name, values in answers.items():
@@ -157,7 +157,9 @@ def _rules(
                     "burden mass v² / 2 at most the heat of explosion", 1.0 - share)  # fmt: skip
 
 
-def _energy_rules(answers: Mapping[str, Floats], domain: Domain, points: Points) -> Iterator[_Rule]:
+def _energy_rules(
+    answers: Mapping[str, FloatArray], domain: Domain, points: Points
+) -> Iterator[_Rule]:
     per_metre, per_hole = _charge(domain, points)
     for names, energy in ((_PER_METRE, per_metre), (_PER_HOLE, per_hole)):
         for name in names:
@@ -167,25 +169,25 @@ def _energy_rules(answers: Mapping[str, Floats], domain: Domain, points: Points)
                             np.minimum(share, 1.0 - share))  # fmt: skip
 
 
-def _finite(values: Floats) -> Floats:
+def _finite(values: FloatArray) -> FloatArray:
     return np.where(np.isfinite(values), values, -np.inf)
 
 
-def _charge(domain: Domain, points: Points) -> tuple[Floats, Floats]:
+def _charge(domain: Domain, points: Points) -> tuple[FloatArray, FloatArray]:
     """Heat of explosion of the charge: (n,) [J m-1] and (n,) [J]."""
     area = 0.25 * pi * points.inputs["charge_diameter"] ** 2
     per_metre = domain.energy[points.explosive] * area
     return per_metre, per_metre * points.inputs["charge_length"]
 
 
-def _burden_mass(inputs: Mapping[str, Floats]) -> Floats:
+def _burden_mass(inputs: Mapping[str, FloatArray]) -> FloatArray:
     """Mass of rock per hole [kg], toe burden included."""
     height = inputs["bench_height"]
     mean = inputs["burden"] + 0.5 * height / np.tan(inputs["face_angle"])
     return inputs["rock_density"] * inputs["spacing"] * height * mean
 
 
-def _explosion_pressure(probe: Probe, points: Points) -> Floats | None:
+def _explosion_pressure(probe: Probe, points: Points) -> FloatArray | None:
     """Explosion pressure at points, where it follows from the explosive alone, else None."""
     if points is probe.points:
         return probe.outputs["explosion_pressure"]
@@ -252,14 +254,14 @@ def _answers_to(surrogate: Surrogate, pairs: Pairs) -> bool:
     return any(np.any(low[name] != high[name]) for name in surrogate.features)
 
 
-def _slopes(surrogate: Surrogate, domain: Domain, pairs: Pairs) -> Floats:
+def _slopes(surrogate: Surrogate, domain: Domain, pairs: Pairs) -> FloatArray:
     low, high = (surrogate.answers(domain, end)[VELOCITY] for end in (pairs.low, pairs.high))
     # A velocity of 0 or below has no logarithm: NaN, which is wrong.
     return np.asarray(np.log(high / low) / pairs.step)
 
 
 def _spot(
-    domain: Domain, points: Points, row: int, answers: Mapping[str, Floats]
+    domain: Domain, points: Points, row: int, answers: Mapping[str, FloatArray]
 ) -> dict[str, Any]:
     inputs = {name: float(points.inputs[name][row]) for name in domain.sampled}
     found = {name: float(values[row]) for name, values in answers.items()}

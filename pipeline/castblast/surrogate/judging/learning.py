@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from castblast.network import Floats
 from castblast.surrogate.fitting.training import LearningPoint
+from castblast.types import FloatArray
 
 #: Fewest points of a curve: one more than the law has parameters.
 FEWEST_POINTS = 4
@@ -49,15 +49,15 @@ class PowerLaw:
     floor: float
     scale: float
     exponent: float
-    draws: Floats
+    draws: FloatArray
     scatter: float
     most_rows: float
 
-    def __call__(self, rows: Any) -> Floats:
+    def __call__(self, rows: Any) -> FloatArray:
         """Error at numbers of rows."""
         return _law(np.array([self.floor, self.scale, self.exponent]), np.asarray(rows, float))
 
-    def interval(self, rows: Any) -> tuple[Floats, Floats]:
+    def interval(self, rows: Any) -> tuple[FloatArray, FloatArray]:
         """95 % interval of the law at numbers of rows."""
         each = np.stack([_law(draw, np.asarray(rows, float)) for draw in self.draws])
         low, high = np.quantile(each, (0.025, 0.975), axis=0)
@@ -227,12 +227,12 @@ def _document(law: PowerLaw) -> dict[str, Any]:
     return {**values, **ends, "scatter": law.scatter}
 
 
-def _law(parameters: Floats, rows: Floats) -> Floats:
+def _law(parameters: FloatArray, rows: FloatArray) -> FloatArray:
     floor, scale, exponent = parameters
     return np.asarray(floor + scale * rows**-exponent)
 
 
-def _rows_for(parameters: Floats, error: float) -> Floats:
+def _rows_for(parameters: FloatArray, error: float) -> FloatArray:
     """Rows (b,) at which laws (b, 3) reach an error; inf where they never do."""
     floor, scale, exponent = parameters.T
     rows = np.full(len(parameters), np.inf)
@@ -241,21 +241,21 @@ def _rows_for(parameters: Floats, error: float) -> Floats:
     return rows
 
 
-def _fit(rows: Floats, log_errors: Floats, start: Floats | None = None) -> Floats:
+def _fit(rows: FloatArray, log_errors: FloatArray, start: FloatArray | None = None) -> FloatArray:
     """Least squares in logarithms; bounded to floor >= 0, scale > 0, 0 <= exponent <= 4."""
     from scipy.optimize import least_squares
 
     middle = float(np.exp(np.mean(np.log(rows))))
 
-    def parts(p: Floats) -> tuple[Floats, Floats]:
+    def parts(p: FloatArray) -> tuple[FloatArray, FloatArray]:
         # p: floor as a share of the least error, logarithm of the fall at the middle, exponent
         fall = np.exp(p[1]) * (rows / middle) ** -p[2]
         return p[0] * least + fall, fall
 
-    def residuals(p: Floats) -> Floats:
+    def residuals(p: FloatArray) -> FloatArray:
         return np.asarray(np.log(parts(p)[0]) - log_errors)
 
-    def slopes(p: Floats) -> Floats:
+    def slopes(p: FloatArray) -> FloatArray:
         law, fall = parts(p)
         each = (np.full_like(law, least), fall, -fall * np.log(rows / middle))
         return np.stack(each, axis=1) / law[:, None]

@@ -23,9 +23,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from castblast.network import Floats
 from castblast.progress import ProgressCallback, silent
 from castblast.surrogate.judging.domain import Domain, Points
+from castblast.types import FloatArray
 
 #: The output that the directions are about.
 VELOCITY = "burden_velocity"
@@ -91,9 +91,9 @@ class Pairs:
     low: Points
     high: Points
     at: Points
-    step: Floats
-    sign: Floats
-    slope: Floats
+    step: FloatArray
+    sign: FloatArray
+    slope: FloatArray
 
     @property
     def clear(self) -> float:
@@ -145,7 +145,7 @@ class Probe:
 
     domain: Domain
     points: Points
-    outputs: Mapping[str, Floats]
+    outputs: Mapping[str, FloatArray]
     pairs: tuple[Pairs, ...]
     dense: Points
     dense_pairs: tuple[Pairs, ...]
@@ -236,7 +236,7 @@ def _moves(domain: Domain, direction: Direction) -> bool:
 
 def _changes(
     domain: Domain, points: Points, direction: Direction, factor: float
-) -> dict[str, Floats]:
+) -> dict[str, FloatArray]:
     """Variables of the recipe that a step of a direction changes."""
     inputs, variables = points.inputs, domain.recipe.variables
     name, charge_given = direction.name, "charge_length" in variables
@@ -252,7 +252,7 @@ def _changes(
     return changes
 
 
-def _required_sign(direction: Direction, points: Points) -> Floats:
+def _required_sign(direction: Direction, points: Points) -> FloatArray:
     if direction.name != "bench_height":
         return np.full(points.size, float(direction.sign))
     inputs = points.inputs

@@ -25,19 +25,18 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-from castblast.network import Floats
 from castblast.progress import ProgressCallback, silent
 from castblast.surrogate.fitting.training import Fit
 from castblast.surrogate.judging.domain import Domain, Points
 from castblast.surrogate.judging.gate import Surrogate, fit_surrogate
 from castblast.surrogate.judging.probe import VELOCITY
+from castblast.types import BoolArray, FloatArray
 
 #: Places of the unit box (n, d) to answers (n, m).
-Ask: TypeAlias = Callable[[Floats], Floats]
+Ask: TypeAlias = Callable[[FloatArray], FloatArray]
 #: Places of the unit box (n, d) to whether they are in the domain (n,).
-Possible: TypeAlias = Callable[[Floats], NDArray[np.bool_]]
+Possible: TypeAlias = Callable[[FloatArray], BoolArray]
 
 #: Name of the explosive among the inputs.
 EXPLOSIVE = "explosive"
@@ -79,10 +78,10 @@ class Sample(NamedTuple):
     same_rest : Points that share all else with `base` and are drawn anew in the input.
     """
 
-    base: Floats
-    other: Floats
-    same_input: Floats
-    same_rest: Floats
+    base: FloatArray
+    other: FloatArray
+    same_input: FloatArray
+    same_rest: FloatArray
 
 
 def sobol_report(
@@ -125,18 +124,18 @@ def sobol_report(
     names, kinds = (*domain.sampled, EXPLOSIVE), len(domain.explosives)
     headline = VELOCITY if VELOCITY in surrogate.targets else surrogate.targets[0]
 
-    def points(shares: Floats) -> Points:
+    def points(shares: FloatArray) -> Points:
         kind = np.minimum(shares[:, -1] * kinds, kinds - 1).astype(np.int64)
         return domain.points(np.ascontiguousarray(shares[:, :-1]), kind)
 
-    def possible(shares: Floats) -> NDArray[np.bool_]:
+    def possible(shares: FloatArray) -> BoolArray:
         return domain.possible(shares[:, :-1])
 
-    def ask(shares: Floats) -> Floats:
+    def ask(shares: FloatArray) -> FloatArray:
         answers = surrogate.answers(domain, points(shares))
         return np.stack([answers[name] for name in surrogate.targets], axis=1)
 
-    def simulate(shares: Floats) -> Floats:
+    def simulate(shares: FloatArray) -> FloatArray:
         return domain.simulate(points(shares), surrogate.targets)
 
     samples = draw_samples(names, possible, rows, seed, progress=progress)
@@ -244,7 +243,9 @@ def sobol_indices(samples: Mapping[str, Sample], ask: Ask) -> dict[str, list[Ind
     return found
 
 
-def _index(base: Floats, other: Floats, same_input: Floats, same_rest: Floats, seed: int) -> Index:
+def _index(
+    base: FloatArray, other: FloatArray, same_input: FloatArray, same_rest: FloatArray, seed: int
+) -> Index:
     """Indices by the estimators of SALib, from rows where every answer is finite.
 
     Its first-order estimator is the mean of f(B) (f(AB) - f(A)), A independent of B and AB sharing
@@ -257,7 +258,7 @@ def _index(base: Floats, other: Floats, same_input: Floats, same_rest: Floats, s
     return Index(first["S1"], first["S1_conf"], total["ST"], total["ST_conf"])
 
 
-def _analyze(a: Floats, ab: Floats, b: Floats, seed: int) -> dict[str, float]:
+def _analyze(a: FloatArray, ab: FloatArray, b: FloatArray, seed: int) -> dict[str, float]:
     from SALib.analyze import sobol
 
     result = sobol.analyze(
@@ -272,8 +273,8 @@ def _analyze(a: Floats, ab: Floats, b: Floats, seed: int) -> dict[str, float]:
 
 
 def _redraw(
-    places: Floats, which: NDArray[np.bool_], possible: Possible, rng: np.random.Generator
-) -> Floats:
+    places: FloatArray, which: BoolArray, possible: Possible, rng: np.random.Generator
+) -> FloatArray:
     """Draw some columns (d,) of places (n, d) anew until each place is possible."""
     drawn = places.copy()
     left = np.arange(len(places))

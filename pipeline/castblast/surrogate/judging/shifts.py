@@ -11,19 +11,17 @@ from dataclasses import replace
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from castblast.errors import DatasetError
-from castblast.network import Floats
 from castblast.progress import ProgressCallback, silent
 from castblast.specs.models.model import ModelSpec
 from castblast.surrogate.fitting.features import MINIMUM_ROWS, Table
 from castblast.surrogate.fitting.metrics import score_targets, summary_error
 from castblast.surrogate.fitting.training import Fit, fit_spec
 from castblast.surrogate.judging.domain import Domain
+from castblast.types import BoolArray, FloatArray, IntArray
 
 Refit: TypeAlias = Callable[[ModelSpec, Table], Fit]
-Mask: TypeAlias = NDArray[np.bool_]
 
 #: Share of the rows, those with the largest group, that an extrapolation leaves out.
 _EXTREME = 0.2
@@ -39,7 +37,7 @@ class Shift(NamedTuple):
     kind: str
     name: str
     says: str
-    away: Mask
+    away: BoolArray
 
 
 def shift_tests(
@@ -126,9 +124,9 @@ def _groups(table: Table, domain: Domain | None) -> Iterator[Shift]:
         yield Shift("group", name, f"{name} above {edge:.4g}", values > edge)
 
 
-def dimensionless_groups(table: Table, domain: Domain | None = None) -> dict[str, Floats]:
+def dimensionless_groups(table: Table, domain: Domain | None = None) -> dict[str, FloatArray]:
     """Groups that the inputs of a table allow, by name, (n,)."""
-    columns: dict[str, Floats] = {
+    columns: dict[str, FloatArray] = {
         name: table.frame[name].to_numpy(dtype=np.float64) for name in table.feature_names
     }
     columns |= {name: np.full(len(table.frame), v) for name, v in table.held.items()}
@@ -149,7 +147,7 @@ def dimensionless_groups(table: Table, domain: Domain | None = None) -> dict[str
     }
 
 
-def _explosion_pressures(table: Table, domain: Domain) -> Floats:
+def _explosion_pressures(table: Table, domain: Domain) -> FloatArray:
     """Explosion pressure of each row's explosive [Pa], of the simulator on one point each."""
     count = len(domain.explosives)
     one = domain.spread(1)
@@ -189,7 +187,7 @@ def _test(fit: Fit, table: Table, shift: Shift, refit: Refit) -> dict[str, Any]:
     }
 
 
-def _judge(fit: Fit, table: Table, judged: NDArray[np.int64]) -> dict[str, Any]:
+def _judge(fit: Fit, table: Table, judged: IntArray) -> dict[str, Any]:
     """Scores of a fit on rows of `table`, found again in the table of the fit by their sample."""
     place = {sample: i for i, sample in enumerate(fit.table.sample.tolist())}
     rows = np.array([place[sample] for sample in table.sample[judged].tolist()])
@@ -203,7 +201,7 @@ def _judge(fit: Fit, table: Table, judged: NDArray[np.int64]) -> dict[str, Any]:
     }
 
 
-def _rows(table: Table, keep: Mask) -> Table:
+def _rows(table: Table, keep: BoolArray) -> Table:
     return replace(
         table,
         frame=table.frame[keep],

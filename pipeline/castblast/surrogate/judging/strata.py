@@ -5,9 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from castblast.network import Floats
 from castblast.surrogate.fitting.features import Split, Table, domain_constraints
 from castblast.surrogate.fitting.metrics import (
     LEVEL,
@@ -16,6 +14,7 @@ from castblast.surrogate.fitting.metrics import (
     score_targets,
 )
 from castblast.surrogate.fitting.training import Fit
+from castblast.types import BoolArray, FloatArray, IntArray
 
 
 def strata(fit: Fit, split: Split = "test", bins: int = 10) -> dict[str, Any]:
@@ -160,12 +159,12 @@ def _error_map(
     }
 
 
-def _edges(values: Floats, bins: int) -> Floats:
+def _edges(values: FloatArray, bins: int) -> FloatArray:
     """Ends of bins of equal count; fewer where values repeat."""
     return np.unique(np.quantile(values, np.linspace(0.0, 1.0, bins + 1)))
 
 
-def _places(values: Floats, edges: Floats) -> NDArray[np.int64]:
+def _places(values: FloatArray, edges: FloatArray) -> IntArray:
     """Bin of each value; the last bin holds its upper end."""
     place = np.searchsorted(edges, values, side="right") - 1
     return np.clip(place, 0, max(len(edges) - 2, 0)).astype(np.int64)
@@ -178,19 +177,19 @@ def _spread(cells: list[dict[str, Any]], target: str) -> float | None:
     return float(max(errors) / min(errors))
 
 
-def _places_in_box(table: Table, rows: NDArray[np.int64]) -> Floats:
+def _places_in_box(table: Table, rows: IntArray) -> FloatArray:
     """Where rows lie between the least and greatest training value of each feature, (n, k)."""
     numeric = table.frame[list(table.feature_names)].to_numpy(dtype=np.float64)
     train = numeric[table.rows("train")]
     low, width = train.min(axis=0), np.ptp(train, axis=0)
-    places: Floats = (numeric[rows] - low) / np.where(width > 0.0, width, 1.0)
+    places: FloatArray = (numeric[rows] - low) / np.where(width > 0.0, width, 1.0)
     return places
 
 
-def _in_training_domain(table: Table, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _in_training_domain(table: Table, rows: IntArray) -> BoolArray:
     """Rows inside the box and the rules of the training rows, for fits without a network too."""
     places = _places_in_box(table, rows)
-    inside: NDArray[np.bool_] = np.all((places >= 0.0) & (places <= 1.0), axis=1)
+    inside: BoolArray = np.all((places >= 0.0) & (places <= 1.0), axis=1)
     frame = table.frame.iloc[rows]
     columns = {name: frame[name].to_numpy(dtype=np.float64) for name in table.feature_names}
     for rule in domain_constraints(table):
@@ -198,7 +197,7 @@ def _in_training_domain(table: Table, rows: NDArray[np.int64]) -> NDArray[np.boo
     return inside
 
 
-def _by_target(table: Table, values: Floats) -> dict[str, float | None]:
+def _by_target(table: Table, values: FloatArray) -> dict[str, float | None]:
     return {name: _json(value) for name, value in zip(table.target_names, values, strict=True)}
 
 

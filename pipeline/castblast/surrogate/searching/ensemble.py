@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from castblast.errors import SpecError
-from castblast.network import Column, Floats, Network
+from castblast.network import Column, Network
 from castblast.progress import ProgressCallback, part, silent
 from castblast.specs.models.model import ModelSpec
 from castblast.surrogate.fitting.estimators import predict
 from castblast.surrogate.fitting.features import Table
 from castblast.surrogate.fitting.training import Fit, fit_spec
+from castblast.types import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -51,7 +52,7 @@ def fit_members(
     ]
 
 
-def ensemble_spread(fits: Sequence[Fit], frame: pd.DataFrame) -> Floats:
+def ensemble_spread(fits: Sequence[Fit], frame: pd.DataFrame) -> FloatArray:
     """Relative standard deviation over the fits, (n, m): over the absolute value of the first."""
     answers = np.stack([predict(fit.estimator, frame) for fit in fits])
     return np.asarray(np.std(answers, axis=0, ddof=1) / np.abs(answers[0]))

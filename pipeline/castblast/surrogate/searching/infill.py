@@ -8,16 +8,15 @@ the one with the largest worth, and the worth of what lies close to a row just t
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from castblast.network import Floats
+from castblast.types import FloatArray, IntArray
 
 #: Rows drawn for every row to be chosen.
 POOL_FACTOR = 20
 _NEIGHBOUR_SAMPLE = 500
 
 
-def infill_worth(spread: Floats) -> Floats:
+def infill_worth(spread: FloatArray) -> FloatArray:
     """One figure for every row: root mean square over the targets of their relative spreads.
 
     Parameters
@@ -33,9 +32,7 @@ def infill_worth(spread: Floats) -> Floats:
     return np.asarray(np.sqrt(np.mean((spread / np.median(spread, axis=0)) ** 2, axis=1)))
 
 
-def choose_batch(
-    points: Floats, kinds: NDArray[np.int64], worth: Floats, count: int
-) -> NDArray[np.int64]:
+def choose_batch(points: FloatArray, kinds: IntArray, worth: FloatArray, count: int) -> IntArray:
     """Choose rows of a pool, worth most and apart from each other.
 
     Parameters
@@ -68,7 +65,7 @@ def choose_batch(
     return chosen
 
 
-def _typical_gap(points: Floats, count: int) -> float:
+def _typical_gap(points: FloatArray, count: int) -> float:
     """Distance from a row to its nearest neighbour among `count` rows of the pool, median."""
     from scipy.spatial import cKDTree
 

@@ -10,10 +10,11 @@ import numpy as np
 from castblast.disk.reading import read_npz
 from castblast.errors import SpecError, nearest_name
 from castblast.muckpile.balls.contact import ContactLaw
-from castblast.muckpile.balls.particles import FloatArray, Particles
+from castblast.muckpile.balls.particles import Particles
 from castblast.muckpile.bench.given import initial_state
 from castblast.specs.bench.balls.tables import PLACE, RADIUS, VELOCITY, balls_at, read_ball_table
 from castblast.specs.quantity import QuantityError
+from castblast.types import FloatArray
 
 _KEYS = ("x", "r")
 _PLACE, _MOTION = ("x", "y", "z"), ("vx", "vy", "vz")

@@ -11,13 +11,14 @@ import numpy as np
 
 from castblast.errors import SpecError
 from castblast.muckpile.balls.contact import ContactLaw
-from castblast.muckpile.balls.particles import FloatArray, IntArray, Particles
+from castblast.muckpile.balls.particles import Particles
 from castblast.muckpile.bench.given import initial_state
 from castblast.specs.bench.balls.engines import engine_sheets
 from castblast.specs.bench.balls.spec import RADII
 from castblast.specs.quantity import QuantityIn
 from castblast.specs.tables.table import Form, Table, table_of
 from castblast.specs.tables.text import open_sheet, read_lines
+from castblast.types import FloatArray, IntArray
 
 #: Bounds of radii, places and velocities, in whatever file they stand.
 RADIUS = QuantityIn("m", *RADII)

@@ -9,8 +9,8 @@ import numpy as np
 
 from castblast.disk.reading import read_bytes
 from castblast.errors import SpecError, nearest_name
-from castblast.muckpile.balls.particles import FloatArray
 from castblast.specs.tables.text import MOST_BYTES, decode
+from castblast.types import FloatArray
 
 _NEEDED = ("ncols", "nrows")
 _KEYS = (

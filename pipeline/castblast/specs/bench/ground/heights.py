@@ -9,12 +9,12 @@ import numpy as np
 
 from castblast.disk.reading import read_npz
 from castblast.errors import SpecError, nearest_name
-from castblast.muckpile.balls.particles import FloatArray
 from castblast.muckpile.ground.terrain import height_faults, missing_heights
 from castblast.specs.bench.ground.asc import is_esri_grid, read_esri_grid
 from castblast.specs.bench.ground.points import read_points
 from castblast.specs.bench.ground.stl import single_precision_remark
 from castblast.specs.units import unit_factor
+from castblast.types import FloatArray
 
 _GRID_KEYS = ("x0", "y0", "dx")
 _AXIS_KEYS = ("x", "y")

@@ -5,14 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from castblast.errors import SpecError
-from castblast.muckpile.balls.particles import FloatArray
 from castblast.specs.quantity import QuantityIn
 from castblast.specs.tables.table import Form, Table, read_table
 from castblast.specs.tables.text import NUMBER, open_sheet
 from castblast.specs.units import unit_factor
+from castblast.types import FloatArray, IntArray
 
 #: Largest difference of a place from a regular grid, over its spacing.
 _OFF_GRID = 1e-3
@@ -94,7 +93,7 @@ def _in_metres(path: Path, table: Table, name: str, unit: str) -> FloatArray:
     return values * unit_factor(unit, "m")
 
 
-def _places(values: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
+def _places(values: FloatArray) -> tuple[FloatArray, IntArray]:
     """Distinct places among `values` and the number of the place of each; close ones are one."""
     order = np.argsort(values, kind="stable")
     gap = np.diff(values[order])
@@ -109,8 +108,8 @@ def _on_grid(
     table: Table,
     points: FloatArray,
     shape: tuple[int, int],
-    row: NDArray[np.int64],
-    column: NDArray[np.int64],
+    row: IntArray,
+    column: IntArray,
 ) -> FloatArray:
     count = np.zeros(shape, dtype=np.int64)
     np.add.at(count, (row, column), 1)

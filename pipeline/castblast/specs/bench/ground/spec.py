@@ -11,7 +11,6 @@ import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from castblast.errors import SpecError
-from castblast.muckpile.balls.particles import FloatArray
 from castblast.muckpile.bench.geometry import Bench
 from castblast.muckpile.ground.mend import Mended, Repair, cracks, median_side, mend, weld_distance
 from castblast.muckpile.ground.terrain import heightmap, named_facets, surface_faults
@@ -22,6 +21,7 @@ from castblast.specs.bench.place import Extent, extent, place_faults, place_rema
 from castblast.specs.loading import Spec
 from castblast.specs.quantity import QuantityError, QuantityIn
 from castblast.specs.units import unit_factor
+from castblast.types import FloatArray
 
 _ONTO = "'shift' would have to be {offset} for its least corner to lie at the toe of the bench"
 #: Depth [m] below the floor from which it is said that the floor lies over the ground there.

@@ -19,7 +19,7 @@ import numpy as np
 from castblast.disk.reading import read_bytes
 from castblast.errors import SpecError
 from castblast.extras import require
-from castblast.muckpile.balls.particles import FloatArray
+from castblast.types import FloatArray
 
 #: More facets take more memory than most machines have: some 5 kB each as a wall.
 MOST_FACETS = 1_000_000

@@ -11,7 +11,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from castblast.network import Activation, Floats, Layer
+from castblast.network import Activation, Layer
+from castblast.types import FloatArray
 
 Chain: TypeAlias = tuple[Layer, ...]
 
@@ -122,7 +123,7 @@ def _levels(chains: Sequence[Chain]) -> list[tuple[Layer, ...]]:
     return levels
 
 
-def _diagonal(level: Sequence[Layer]) -> Floats:
+def _diagonal(level: Sequence[Layer]) -> FloatArray:
     rows = sum(layer.weights.shape[0] for layer in level)
     columns = sum(layer.weights.shape[1] for layer in level)
     joined = np.zeros((rows, columns))
@@ -134,5 +135,5 @@ def _diagonal(level: Sequence[Layer]) -> Floats:
     return joined
 
 
-def _stack(above: Floats, below: Floats) -> Floats:
+def _stack(above: FloatArray, below: FloatArray) -> FloatArray:
     return np.vstack([above, below])

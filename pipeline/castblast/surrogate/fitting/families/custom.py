@@ -14,9 +14,9 @@ import numpy as np
 from sklearn.base import BaseEstimator, RegressorMixin
 
 from castblast.errors import SpecError, nearest_name
-from castblast.network import Floats
 from castblast.surrogate.fitting.families.chains import Chain
 from castblast.surrogate.fitting.families.dense_models import layers_of
+from castblast.types import FloatArray
 
 #: Given to a factory that has parameters of these names.
 _OFFERED = ("inputs", "outputs", "seed")
@@ -86,10 +86,10 @@ class CustomModel(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             self.layers_ = chain
         return self
 
-    def predict(self, x: Any) -> Floats:
+    def predict(self, x: Any) -> FloatArray:
         """Evaluate scaled rows (n, k)."""
         with importable(self.folder):
-            values: Floats = np.asarray(self.model_.predict(x), dtype=np.float64)
+            values: FloatArray = np.asarray(self.model_.predict(x), dtype=np.float64)
         return values
 
     def _make(self, inputs: int, outputs: int) -> Any:
@@ -122,7 +122,7 @@ class CustomModel(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             message = f"{self.factory}: fails with options {dict(self.options or {})}: {fault}"
             raise SpecError(message) from fault
 
-    def _check_shape(self, x: Any, targets: Floats) -> None:
+    def _check_shape(self, x: Any, targets: FloatArray) -> None:
         rows = min(3, len(x))
         shape = np.shape(self.predict(x[:rows]))
         wanted = (rows, *targets.shape[1:])

@@ -8,9 +8,10 @@ from typing import Any, Self
 import numpy as np
 from sklearn.base import BaseEstimator, RegressorMixin
 
-from castblast.network import Activation, Floats, Layer, run_layers
+from castblast.network import Activation, Layer, run_layers
 from castblast.surrogate.fitting.families.chains import Chain, embed, one_for_each, side_by_side
 from castblast.surrogate.fitting.families.levenberg import LevenbergResult, fit_dense
+from castblast.types import FloatArray
 
 
 def layers_of(model: Any) -> Chain | None:
@@ -33,7 +34,7 @@ def layers_of(model: Any) -> Chain | None:
     return None
 
 
-def as_matrix(targets: Any) -> Floats:
+def as_matrix(targets: Any) -> FloatArray:
     """Targets (n,) or (n, m) as (n, m) float64."""
     values = np.asarray(targets, dtype=np.float64)
     return values.reshape(len(values), -1)
@@ -44,12 +45,12 @@ class ChainRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
 
     layers_: Chain
 
-    def predict(self, x: Any) -> Floats:
+    def predict(self, x: Any) -> FloatArray:
         """Evaluate rows (n, k): (n, m), or (n,) where a single target was fitted as a vector."""
         values = run_layers(self.layers_, np.asarray(x, dtype=np.float64))
         return values[:, 0] if self.as_vector_ else values
 
-    def _note_shape(self, targets: Any) -> Floats:
+    def _note_shape(self, targets: Any) -> FloatArray:
         self.as_vector_ = np.ndim(targets) == 1
         return as_matrix(targets)
 
@@ -120,7 +121,7 @@ class LevenbergMlp(ChainRegressor):
         )
         return self
 
-    def _fit_target(self, x: Floats, y: Floats, number: int) -> Chain:
+    def _fit_target(self, x: FloatArray, y: FloatArray, number: int) -> Chain:
         seen = range(x.shape[1]) if self.columns is None else self.columns[number]
         if not self.categories:
             return embed(self._fit_rows(x[:, list(seen)], y, number), seen, x.shape[1])
@@ -132,7 +133,7 @@ class LevenbergMlp(ChainRegressor):
             chains.append(embed(self._fit_rows(x[rows][:, seen], y[rows], number), seen, numbers))
         return one_for_each(chains)
 
-    def _fit_rows(self, x: Floats, y: Floats, number: int) -> Chain:
+    def _fit_rows(self, x: FloatArray, y: FloatArray, number: int) -> Chain:
         """Fit one network: first steps, on some of the rows if there are many more, then all."""
         rows: Any = slice(None)
         if len(y) > 1.5 * self.start_rows:
@@ -151,7 +152,12 @@ class LevenbergMlp(ChainRegressor):
         return result.layers
 
     def _levenberg(
-        self, x: Floats, y: Floats, steps: int, seed: int | Sequence[int], start: Floats | None
+        self,
+        x: FloatArray,
+        y: FloatArray,
+        steps: int,
+        seed: int | Sequence[int],
+        start: FloatArray | None,
     ) -> LevenbergResult:
         return fit_dense(
             np.ascontiguousarray(x),

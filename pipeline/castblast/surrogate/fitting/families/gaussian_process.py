@@ -11,7 +11,7 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
-from castblast.network import Floats
+from castblast.types import FloatArray
 
 
 class SubsetGaussianProcess(RegressorMixin, BaseEstimator):  # type: ignore[misc]
@@ -56,9 +56,9 @@ class SubsetGaussianProcess(RegressorMixin, BaseEstimator):  # type: ignore[misc
         self.process_.fit(inputs[most], targets[most])
         return self
 
-    def predict(self, x: Any) -> Floats:
+    def predict(self, x: Any) -> FloatArray:
         """Posterior mean at scaled rows (n, k)."""
         rows = np.asarray(x, dtype=np.float64)
         parts = [self.process_.predict(rows[at : at + 1000]) for at in range(0, len(rows), 1000)]
-        mean: Floats = np.concatenate(parts)
+        mean: FloatArray = np.concatenate(parts)
         return mean

@@ -20,7 +20,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from castblast.network import Activation, Floats, Layer
+from castblast.network import Activation, Layer
+from castblast.types import FloatArray
 
 _BLOCK_ROWS = 2000
 _FIRST_DAMPING = 1e-2
@@ -48,15 +49,15 @@ class LevenbergResult(NamedTuple):
     """
 
     layers: tuple[Layer, ...]
-    weights: Floats
+    weights: FloatArray
     steps: int
     converged: bool
     objective: float
 
 
 def fit_dense(
-    x: Floats,
-    y: Floats,
+    x: FloatArray,
+    y: FloatArray,
     hidden: Sequence[int],
     activation: Activation,
     *,
@@ -64,7 +65,7 @@ def fit_dense(
     max_steps: int,
     tolerance: float,
     seed: int | Sequence[int],
-    start: Floats | None = None,
+    start: FloatArray | None = None,
 ) -> LevenbergResult:
     """Fit a dense network to rows.
 
@@ -119,7 +120,7 @@ def fit_dense(
     return LevenbergResult(net.layers(weights), weights, len(history) - 1, converged, objective)
 
 
-def _solve(matrix: Floats, slope: Floats, shift: float) -> Floats | None:
+def _solve(matrix: FloatArray, slope: FloatArray, shift: float) -> FloatArray | None:
     """Solve (matrix + shift I) step = -slope; None where rounding made it not positive."""
     from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
@@ -129,7 +130,7 @@ def _solve(matrix: Floats, slope: Floats, shift: float) -> Floats | None:
         factor = cho_factor(shifted, lower=True, overwrite_a=True, check_finite=False)
     except LinAlgError:
         return None
-    step: Floats = cho_solve(factor, -slope, check_finite=False)
+    step: FloatArray = cho_solve(factor, -slope, check_finite=False)
     return step if np.isfinite(step).all() else None
 
 
@@ -137,12 +138,12 @@ class _Net:
     """A dense network with one output as a function of one vector of weights."""
 
     def __init__(
-        self, sizes: tuple[int, ...], activation: Activation, x: Floats, y: Floats
+        self, sizes: tuple[int, ...], activation: Activation, x: FloatArray, y: FloatArray
     ) -> None:
         self.sizes, self.activation, self.x, self.y = sizes, activation, x, y
         self.count = sum((a + 1) * b for a, b in pairwise(sizes))
 
-    def start(self, rng: np.random.Generator) -> Floats:
+    def start(self, rng: np.random.Generator) -> FloatArray:
         """Random weights that keep the spread of the inputs; biases spread over it."""
         parts = []
         for depth, (a, b) in enumerate(pairwise(self.sizes)):
@@ -153,7 +154,7 @@ class _Net:
             ]
         return np.concatenate(parts)
 
-    def _split(self, weights: Floats) -> list[tuple[Floats, Floats]]:
+    def _split(self, weights: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
         split, at = [], 0
         for a, b in pairwise(self.sizes):
             middle, end = at + a * b, at + (a + 1) * b
@@ -161,7 +162,7 @@ class _Net:
             at = end
         return split
 
-    def layers(self, weights: Floats) -> tuple[Layer, ...]:
+    def layers(self, weights: FloatArray) -> tuple[Layer, ...]:
         """The network as layers of their own memory."""
         split = self._split(weights)
         last = len(split) - 1
@@ -171,8 +172,8 @@ class _Net:
         )
 
     def _forward(
-        self, split: list[tuple[Floats, Floats]], x: Floats
-    ) -> tuple[list[Floats], list[Floats]]:
+        self, split: list[tuple[FloatArray, FloatArray]], x: FloatArray
+    ) -> tuple[list[FloatArray], list[FloatArray]]:
         """Values of every layer, inputs first, and slopes of every hidden one."""
         values, slopes = [x], []
         for w, b in split[:-1]:
@@ -183,7 +184,7 @@ class _Net:
         values.append(values[-1] @ w + b)
         return values, slopes
 
-    def square(self, weights: Floats) -> float:
+    def square(self, weights: FloatArray) -> float:
         """Sum of squared residuals."""
         split, total = self._split(weights), 0.0
         for rows in self._blocks():
@@ -192,7 +193,7 @@ class _Net:
             total += float(residual @ residual)
         return total
 
-    def normal_equations(self, weights: Floats) -> tuple[Floats, Floats, float]:
+    def normal_equations(self, weights: FloatArray) -> tuple[FloatArray, FloatArray, float]:
         """J'J, J'r and r'r of the residuals."""
         split = self._split(weights)
         matrix = np.zeros((self.count, self.count))
@@ -207,8 +208,11 @@ class _Net:
         return matrix, gradient, total
 
     def _jacobian(
-        self, split: list[tuple[Floats, Floats]], values: list[Floats], slopes: list[Floats]
-    ) -> Floats:
+        self,
+        split: list[tuple[FloatArray, FloatArray]],
+        values: list[FloatArray],
+        slopes: list[FloatArray],
+    ) -> FloatArray:
         """Derivative of the output of each row by each weight, backwards through the layers."""
         count = len(values[0])
         jacobian = np.empty((count, self.count))
@@ -228,7 +232,7 @@ class _Net:
         return [slice(at, at + _BLOCK_ROWS) for at in range(0, len(self.y), _BLOCK_ROWS)]
 
 
-def _activate(activation: Activation, z: Floats) -> tuple[Any, Any]:
+def _activate(activation: Activation, z: FloatArray) -> tuple[Any, Any]:
     """Value and slope of an activation."""
     from scipy.special import expit
 

@@ -16,12 +16,13 @@ from typing import Any, Self
 import numpy as np
 import torch
 
-from castblast.network import Activation, Floats, Layer
+from castblast.network import Activation, Layer
 from castblast.surrogate.fitting.families.chains import Chain, mean_of, one_for_each
 from castblast.surrogate.fitting.families.dense_models import ChainRegressor
+from castblast.types import FloatArray
 
 #: Gets a function from scaled inputs to scaled targets.
-Watch = Callable[[Callable[[Floats], Floats]], None]
+Watch = Callable[[Callable[[FloatArray], FloatArray]], None]
 
 _MODULES: dict[str, type[torch.nn.Module]] = {
     "tanh": torch.nn.Tanh,
@@ -117,7 +118,7 @@ class TorchMlp(ChainRegressor):
         self.layers_ = mean_of(members) if len(members) > 1 else members[0]
         return self
 
-    def _fit_member(self, x: Floats, y: Floats, seed: int) -> Chain:
+    def _fit_member(self, x: FloatArray, y: FloatArray, seed: int) -> Chain:
         if not self.categories:
             return self._fit_rows(x, y, seed, self.watch)
         numbers = x.shape[1] - self.categories
@@ -127,7 +128,7 @@ class TorchMlp(ChainRegressor):
             chains.append(self._fit_rows(x[rows][:, :numbers], y[rows], seed, None))
         return one_for_each(chains)
 
-    def _fit_rows(self, x: Floats, y: Floats, seed: int, watch: Watch | None) -> Chain:
+    def _fit_rows(self, x: FloatArray, y: FloatArray, seed: int, watch: Watch | None) -> Chain:
         schedule = Schedule(
             self.adam_epochs, self.batch_size, self.learning_rate, self.max_iterations,
             self.tolerance, self.penalty,
@@ -182,7 +183,7 @@ class TorchRegressor(ChainRegressor):
             self.layers_ = chain
         return self
 
-    def predict(self, x: Any) -> Floats:
+    def predict(self, x: Any) -> FloatArray:
         """Evaluate rows (n, k)."""
         if hasattr(self, "layers_"):
             return super().predict(x)
@@ -198,8 +199,8 @@ def is_module(candidate: Any) -> bool:
 
 def train_module(
     module: torch.nn.Module,
-    x: Floats,
-    y: Floats,
+    x: FloatArray,
+    y: FloatArray,
     schedule: Schedule,
     seed: int,
     watch: Watch | None = None,
@@ -309,10 +310,12 @@ def _lbfgs(
     return Training(done, False)
 
 
-def _answers(module: torch.nn.Module, x: Floats) -> Floats:
+def _answers(module: torch.nn.Module, x: FloatArray) -> FloatArray:
     module.eval()
     with torch.no_grad():
-        values: Floats = module(torch.from_numpy(np.require(x, requirements=["C", "W"]))).numpy()
+        values: FloatArray = module(
+            torch.from_numpy(np.require(x, requirements=["C", "W"]))
+        ).numpy()
     return values
 
 
