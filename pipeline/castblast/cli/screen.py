@@ -3,7 +3,6 @@
 Rich is imported only when something is drawn, so that `--help` and `predict` start at once.
 """
 
-import json
 import math
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,6 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from castblast.disk.plain import json_text
 from castblast.errors import CheckError
 from castblast.names import printable
 from castblast.progress import ProgressCallback, silent
@@ -77,7 +77,7 @@ class Screen:
 
     def document(self, payload: Mapping[str, Any]) -> None:
         """Print the result as JSON; NaN and infinity become null, as JSON has no such numbers."""
-        print(json.dumps(_plain(payload), indent=2, allow_nan=False))
+        print(json_text(payload), end="")
 
     @contextmanager
     def progress(self, title: str) -> Iterator[ProgressCallback]:
@@ -124,18 +124,3 @@ class _PlainLines:
 def _lines(text: str) -> str:
     """Text of several lines without control characters."""
     return "\n".join(map(printable, text.split("\n")))
-
-
-def _plain(value: Any) -> Any:
-    """Turn arrays, NumPy scalars and paths into what JSON can hold."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if hasattr(value, "tolist"):
-        return _plain(value.tolist())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, bool | int | str) or value is None:
-        return value
-    return str(value)

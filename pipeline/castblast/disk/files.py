@@ -14,11 +14,13 @@ import shutil
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 from uuid import uuid4
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from castblast.disk.plain import json_text
 from castblast.errors import CastblastError, OutputError
 from castblast.names import cell_text
 from castblast.stopping import deferred_stop
@@ -202,6 +204,11 @@ def publish(scratch: Path, folder: Path, replaces: Collection[str] = ()) -> None
 def write_text(path: Path, text: str) -> Path:
     """Write UTF-8 text with Unix line ends."""
     return write_with(path, lambda name: name.write_bytes(text.encode()))
+
+
+def write_json(path: Path, document: Any) -> Path:
+    """Write a document as JSON, see `json_text`."""
+    return write_text(path, json_text(document))
 
 
 def write_csv(path: Path, columns: Mapping[str, ArrayLike | Sequence[str]]) -> Path:

@@ -15,6 +15,7 @@ from typing import Any, NoReturn, TypeVar
 
 import numpy as np
 
+from castblast.disk.plain import as_plain
 from castblast.disk.reading import parse_json, read_text
 from castblast.errors import SpecError
 from castblast.names import shortened
@@ -74,13 +75,7 @@ def _chain(layers: Sequence[Layer]) -> list[dict[str, Any]]:
 
 
 def _plain(record: Column | Constraint | DensityScore) -> dict[str, Any]:
-    values = {entry.name: getattr(record, entry.name) for entry in fields(record)}
-    for key, value in values.items():
-        if isinstance(value, Mapping):
-            values[key] = dict(value)
-        elif isinstance(value, np.ndarray):
-            values[key] = value.tolist()
-    return values
+    return {entry.name: as_plain(getattr(record, entry.name)) for entry in fields(record)}
 
 
 def to_json(network: Network) -> str:

@@ -6,7 +6,6 @@ fit that is kept beside where that would be.
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,7 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from castblast.disk.files import write_text, write_with
+from castblast.disk.files import write_json, write_with
 from castblast.disk.reading import read_json
 from castblast.disk.resources import SHIPPED_NETWORKS, is_bare_name, resource
 from castblast.errors import CheckError, SpecError, nearest_name
@@ -108,7 +107,7 @@ def export(
     lines.append(f"wrote {len(files)} files to {folder}")
     documents = {target: report.to_document() for target, report in reports.items()}
     if parity is not None:
-        files.append(write_text(parity, json.dumps(documents, indent=2) + "\n"))
+        files.append(write_json(parity, documents))
     document = {"network": str(source), "files": [str(path) for path in files], "parity": documents}
     return ExportOutcome(document, lines, files)
 

@@ -16,7 +16,7 @@ from castblast.blast.run import BlastResult, BlastSettings, make_case, result_va
 from castblast.design.hole import expanded_hole_faults
 from castblast.design.rule import as_columns, require_possible
 from castblast.design.variables import VARIABLES
-from castblast.disk.files import require_writable, write_csv, write_text, written_together
+from castblast.disk.files import require_writable, write_csv, write_json, written_together
 from castblast.errors import SimulationError, Status
 from castblast.extras import require
 from castblast.nearfield.case import EndMode, TensionMode
@@ -142,13 +142,11 @@ def _rows(document: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
 
 
 def _write(out: Path, document: Mapping[str, Any], result: BlastResult) -> list[Path]:
-    import json
-
     from castblast.report.simulation_figures import draw_simulation
 
     near, burden = result.near_field, result.burden
     files = [
-        write_text(out / "result.json", json.dumps(document, indent=2) + "\n"),
+        write_json(out / "result.json", document),
         write_csv(
             out / "near_field_history.csv",
             {

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from castblast.disk.files import write_csv, write_text
+from castblast.disk.files import write_csv, write_json, write_text
 from castblast.stages.comparison.page import write_costs, write_page
-from castblast.stages.training.fitting import fit_title, held_out, write_json
+from castblast.stages.training.fitting import fit_title, held_out
 from castblast.stages.training.train import TrainOutcome, show_r_squared, show_share
 
 if TYPE_CHECKING:

@@ -23,6 +23,7 @@ from castblast.dataset.file.provenance import ExplosiveSource, load_explosives, 
 from castblast.dataset.file.store import reading_dataset
 from castblast.dataset.rows.design import make_design
 from castblast.dataset.rows.simulation import Simulator, blast_simulator
+from castblast.disk.plain import as_plain
 from castblast.progress import ProgressCallback, silent
 from castblast.specs.recipe import RecipeSource, load_recipe
 
@@ -164,8 +165,4 @@ def _document(path: Path) -> dict[str, Any]:
     with reading_dataset(path) as dataset:
         attributes = dict(dataset.attrs)
     keys = ("id", "n_ok", "n_failed", "designs_drawn", "recipe_sha256", "content_sha256")
-    return {"path": str(path), **{key: _plain(attributes[key]) for key in keys}}
-
-
-def _plain(value: Any) -> Any:
-    return value.item() if hasattr(value, "item") else value
+    return {"path": str(path), **{key: as_plain(attributes[key]) for key in keys}}

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
 
 from castblast.bands import BASIS, prediction_factor, show_band, show_value
 from castblast.blast.run import make_case, result_values, run_blast
-from castblast.disk.files import write_text
+from castblast.disk.files import write_json
 from castblast.network import evaluate
 from castblast.progress import ProgressCallback
 from castblast.report.prediction_figures import VelocityCurve, draw_velocity_curves
@@ -49,7 +48,7 @@ def compare_with_physics(network: Path, out: Path, progress: ProgressCallback) -
         "Surrogate (lines) and physics (dots), ANFO, other inputs at defaults",
         curves,
     )
-    write_text(out / "comparison.json", json.dumps(document, indent=2) + "\n")
+    write_json(out / "comparison.json", document)
     speed = {"predicted": predicted["burden_velocity"], "simulated": simulated["burden_velocity"]}
     ratio = speed["predicted"] / speed["simulated"] - 1.0
     shown = [f"{show_value('burden_velocity', v)} m/s {word}" for word, v in speed.items()]

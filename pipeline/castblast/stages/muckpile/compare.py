@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -11,15 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from castblast.disk.files import require_writable, tried, write_text, written_together
+from castblast.disk.files import require_writable, tried, write_json, written_together
 from castblast.disk.locks import LOCK_NAME, only_writer
+from castblast.disk.plain import as_plain
 from castblast.errors import SpecError
 from castblast.muckpile.results.metrics import UNITS, Band, band
 from castblast.muckpile.results.profile import Profile
 from castblast.progress import ProgressCallback, silent
 from castblast.specs.bench.bench import BenchSpec
 from castblast.stages.muckpile.read import FinishedRun, numbers, read_runs
-from castblast.stages.muckpile.results import MuckpileOutcome, bench_content, finite
+from castblast.stages.muckpile.results import MuckpileOutcome, bench_content
 from castblast.stages.reuse import forget, is_valid, make_key, mark_valid
 
 _PER_BLOCK = ("block_throw", "block_spread")
@@ -63,14 +63,13 @@ def compare_runs(folders: Sequence[Path], out: Path) -> MuckpileOutcome:
             name: {key: found[key] for key in UNITS if key not in _PER_BLOCK}
             for name, found in zip(names, documents, strict=True)
         },
-        "bands": {name: _plain(found) for name, found in bands.items()},
+        "bands": {name: as_plain(found._asdict()) for name, found in bands.items()},
         "units": UNITS,
     }
-    text = json.dumps(finite(document), indent=2) + "\n"
     files = written_together(
         out,
         lambda folder: [
-            write_text(folder / "comparison.json", text),
+            write_json(folder / "comparison.json", document),
             _draw(folder / "profiles.png", runs, names),
         ],
     )
@@ -168,10 +167,6 @@ def band_rows(bands: Mapping[str, Band]) -> list[tuple[str, str, str]]:
         words = "-" if math.isnan(found.mean) else f"{float(found.mean):.3g}{spread}"
         rows.append((name.replace("_", " "), words, UNITS[name]))
     return rows
-
-
-def _plain(found: Band) -> dict[str, Any]:
-    return {key: np.asarray(value).tolist() for key, value in found._asdict().items()}
 
 
 def _names(folders: Sequence[Path]) -> list[str]:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from castblast.disk.files import staged, tried, write_csv, write_text, write_with
+from castblast.disk.files import staged, tried, write_csv, write_json, write_with
 from castblast.disk.locks import LOCK_NAME, only_writer
+from castblast.disk.plain import as_plain
 from castblast.disk.resources import find_spec
 from castblast.errors import SpecError
 from castblast.muckpile.balls.particles import Particles
@@ -30,8 +30,6 @@ from castblast.stages.muckpile.results import (
     DOCUMENT_UNITS,
     OPTIONAL_FILES,
     MuckpileOutcome,
-    as_plain,
-    finite,
     metric_rows,
 )
 from castblast.stages.muckpile.run import bench_surroundings
@@ -241,7 +239,7 @@ def _write(folder: Path, found: _Measured, document: Mapping[str, Any]) -> Seque
         write_with(folder / "final_state.npz", lambda name: np.savez_compressed(name, **stored)),
         write_with(folder / "surface.npz", lambda name: np.savez(name, **surface._asdict())),
         write_csv(folder / "profile.csv", profiles),
-        write_text(folder / "metrics.json", json.dumps(finite(document), indent=2) + "\n"),
+        write_json(folder / "metrics.json", document),
     ]
     moved = group_movement(before, after, before.block, len(found.plan.delay))
     if moved.balls.any():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from castblast.disk.files import write_csv, write_text, write_with
+from castblast.disk.files import write_csv, write_json, write_with
+from castblast.disk.plain import as_plain, finite
 from castblast.errors import Status
 from castblast.muckpile.cast.solver import CastCase, CastResult
 from castblast.muckpile.results.metrics import UNITS, PileMetrics
@@ -197,7 +197,7 @@ def write_results(
         write_csv(folder / "profile.csv", profile_columns(surface, sections, ground)),
         write_csv(folder / "history.csv", history_columns(result.history)),
         write_csv(folder / "blocks.csv", block_columns(case, after, bench, label)),
-        write_text(folder / "metrics.json", json.dumps(finite(timeless), indent=2) + "\n"),
+        write_json(folder / "metrics.json", timeless),
     ]
     return files + _draw(folder, spec, case, result, ore)
 
@@ -244,21 +244,3 @@ def _draw(
             draw_ore(picture, before, after, bench, ore.polygons, ore.moved, ore.plan.block)
         )
     return files
-
-
-def as_plain(value: Any) -> Any:
-    """Arrays and NumPy scalars as Python lists and numbers, at any depth."""
-    if isinstance(value, Mapping):
-        return {key: as_plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [as_plain(item) for item in value]
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
-
-
-def finite(value: Any) -> Any:
-    """NaN and infinity as null, which JSON can hold."""
-    if isinstance(value, Mapping):
-        return {key: finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -7,13 +7,13 @@ paths. The fitted estimator itself is kept in the cache of the user, see
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from castblast.disk.files import write_csv, write_text
+from castblast.disk.files import write_csv, write_json, write_text
+from castblast.disk.plain import json_text
 from castblast.disk.reading import read_json, read_text
 from castblast.errors import DatasetError, SpecError
 from castblast.extras import missing_libraries, missing_line, require
@@ -266,16 +266,6 @@ def fit_files(folder: Path) -> list[Path]:
     """Files of a fit that mean the same elsewhere."""
     # Earlier versions kept a pickle here; it is never opened.
     return sorted(path for path in folder.iterdir() if path.is_file() and path.suffix != ".pickle")
-
-
-def write_json(path: Path, document: dict[str, Any]) -> Path:
-    """Write plain JSON values."""
-    return write_text(path, json_text(document))
-
-
-def json_text(document: dict[str, Any]) -> str:
-    """Plain JSON values as the text of a file."""
-    return json.dumps(document, indent=2, allow_nan=False) + "\n"
 
 
 def fit_title(fit: Fit) -> str:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from castblast.disk.files import write_text
+from castblast.disk.files import write_json, write_text
 from castblast.progress import ProgressCallback, silent
-from castblast.stages.training.fitting import read_rows, require_training, write_json
+from castblast.stages.training.fitting import read_rows, require_training
 from castblast.stages.training.train import RUNS_FOLDER, TrainOutcome, show_share
 
 if TYPE_CHECKING:

@@ -6,13 +6,13 @@ truth; the same two figures are given for every target and explosive here.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from castblast.disk.plain import finite
 from castblast.types import FloatArray
 
 #: Bound on the relative error whose share is reported.
@@ -42,9 +42,8 @@ class Score(NamedTuple):
 
     def to_document(self) -> dict[str, float | None]:
         """Plain JSON values; None where a figure is not finite, as JSON has no such numbers."""
-        return {
-            key: value if math.isfinite(value) else None for key, value in self._asdict().items()
-        }
+        document: dict[str, float | None] = finite(self._asdict())
+        return document
 
 
 def relative_errors(truth: FloatArray, predicted: FloatArray) -> FloatArray:

@@ -8,12 +8,12 @@ twice.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from castblast.disk.plain import finite
 from castblast.errors import SpecError
 from castblast.surrogate.fitting.metrics import WITHIN, error_quantile, r_squared, score
 from castblast.surrogate.fitting.training import Fit
@@ -163,8 +163,8 @@ def _entry(
         "bytes": None if parameters is None else 8 * parameters,
         "converged": fit.restart.converged,
         "iterations": fit.restart.iterations,
-        "valid_error": _finite(fit.restart.valid_error),
-        "test_error": _finite(float(np.exp(_point(fit, targets)))),
+        "valid_error": finite(fit.restart.valid_error),
+        "test_error": finite(float(np.exp(_point(fit, targets)))),
         "distinguishable_from_first": fit.spec.name != first and first not in alike,
         "not_distinguishable_from": list(alike),
         "meets_marks": all(entry["mark"]["met"] for entry in scores.values()),
@@ -186,10 +186,10 @@ def _target_entry(fit: Fit, target: str, draws: IntArray) -> dict[str, Any]:
     )
     mark = mark_of(target)
     return {
-        "r2": _finite(point.r2),
-        "r2_interval": [_finite(value) for value in r2.tolist()],
-        "relative_error_95": _finite(point.relative_error_95),
-        "relative_error_95_interval": [_finite(value) for value in error.tolist()],
+        "r2": finite(point.r2),
+        "r2_interval": finite(r2),
+        "relative_error_95": finite(point.relative_error_95),
+        "relative_error_95_interval": finite(error),
         f"share_within_{WITHIN:g}": point.share_within,
         "meets_paper_r2": bool(point.r2 >= PAPER_MARKS["r2"]),
         "meets_paper_error": bool(point.relative_error_95 <= PAPER_MARKS["relative_error_95"]),
@@ -197,11 +197,7 @@ def _target_entry(fit: Fit, target: str, draws: IntArray) -> dict[str, Any]:
             **mark._asdict(),
             "met": bool(point.r2 >= mark.r2 and point.relative_error_95 <= mark.relative_error_95),
             # 1 or less is met; 3 means three times the error, or the variance left, allowed.
-            "error_over_mark": _finite(point.relative_error_95 / mark.relative_error_95),
-            "variance_left_over_mark": _finite((1.0 - point.r2) / (1.0 - mark.r2)),
+            "error_over_mark": finite(point.relative_error_95 / mark.relative_error_95),
+            "variance_left_over_mark": finite((1.0 - point.r2) / (1.0 - mark.r2)),
         },
     }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -12,12 +12,13 @@ has a clear slope of the other sign.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from math import isfinite, pi
+from math import pi
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from castblast.design.variables import VARIABLES
+from castblast.disk.plain import finite
 from castblast.surrogate.fitting import estimators
 from castblast.surrogate.fitting.training import Fit
 from castblast.surrogate.judging.domain import Domain, Points
@@ -244,7 +245,7 @@ def _sign_check(
         **_check(name, held, int(known.sum() + required.sum()),
                  int(missing.sum() + wrong.sum()), spot),
         "clear_slope": clear,
-        "least_slope": _json(float(np.min((dense.sign * dense_slopes)[required]))),
+        "least_slope": finite(float(np.min((dense.sign * dense_slopes)[required]))),
     }  # fmt: skip
 
 
@@ -268,12 +269,8 @@ def _spot(
     return {
         "explosive": domain.explosives[int(points.explosive[row])],
         "inputs": inputs,
-        "answers": {name: _json(value) for name, value in found.items()},
+        "answers": finite(found),
     }
-
-
-def _json(value: float) -> float | None:
-    return value if isfinite(value) else None
 
 
 def _check(

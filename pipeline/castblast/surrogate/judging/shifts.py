@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
+from castblast.disk.plain import finite
 from castblast.errors import DatasetError
 from castblast.progress import ProgressCallback, silent
 from castblast.specs.models.model import ModelSpec
@@ -196,7 +197,7 @@ def _judge(fit: Fit, table: Table, judged: IntArray) -> dict[str, Any]:
     return {
         "train_rows": len(fit.table.rows("train")),
         "judged_rows": len(rows),
-        "error": error if np.isfinite(error) else None,
+        "error": finite(error),
         "targets": {name: entry.to_document() for name, entry in scores.items()},
     }
 

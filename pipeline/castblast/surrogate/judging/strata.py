@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from castblast.disk.plain import finite
 from castblast.surrogate.fitting.features import Split, Table, domain_constraints
 from castblast.surrogate.fitting.metrics import (
     LEVEL,
@@ -92,7 +93,7 @@ def worst_cases(fit: Fit, count: int = 10, split: Split = "test") -> list[dict[s
                 "explosive": str(numbers["explosive"]),
                 "inputs": {key: float(numbers[key]) for key in table.feature_names},
                 "target": table.target_names[worst],
-                "relative_error": _json(errors[i, worst]),
+                "relative_error": finite(errors[i, worst]),
                 "truth": _by_target(table, table.targets[row]),
                 "predicted": _by_target(table, fit.predicted[row]),
                 "relative_errors": _by_target(table, errors[i]),
@@ -154,7 +155,7 @@ def _error_map(
         "up": up,
         "across_edges": edges[0].tolist(),
         "up_edges": edges[1].tolist(),
-        "error": [[_json(value) for value in line] for line in error],
+        "error": finite(error),
         "rows": counts.tolist(),
     }
 
@@ -198,8 +199,4 @@ def _in_training_domain(table: Table, rows: IntArray) -> BoolArray:
 
 
 def _by_target(table: Table, values: FloatArray) -> dict[str, float | None]:
-    return {name: _json(value) for name, value in zip(table.target_names, values, strict=True)}
-
-
-def _json(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+    return dict(zip(table.target_names, finite(values), strict=True))

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from castblast import __version__
+from castblast.disk.plain import finite
 from castblast.surrogate.fitting.features import SPLITS
 from castblast.surrogate.fitting.training import Fit, LearningPoint
 from castblast.surrogate.keeping.logged_model import log_model
@@ -245,8 +246,4 @@ def _metrics(fit: Fit) -> dict[str, float]:
 
 def _finite(metrics: Mapping[str, float | int | None]) -> dict[str, float]:
     """Leave out what the store of MLflow cannot hold."""
-    return {
-        name: float(value)
-        for name, value in metrics.items()
-        if value is not None and math.isfinite(value)
-    }
+    return {name: float(value) for name, value in finite(metrics).items() if value is not None}
