@@ -34,6 +34,8 @@ BASIS_KIND = "prior"
 BASIS = "prior: not calibrated on your blasts"
 #: Head of a column of prediction bands.
 BAND_TITLE = "prediction band"
+#: Head of a table of values with their bands.
+BAND_HEADER = ("quantity", "value", BAND_TITLE, "unit")
 #: What it means, for people, with its basis.
 BAND_WORDS = f"prediction band: 5th to 95th percentile of blasts; {BASIS}"
 BAND_SENTENCE = f"P{BAND_WORDS[1:]}."

@@ -8,12 +8,15 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from castblast.disk.plain import json_text
 from castblast.errors import CheckError
 from castblast.names import printable
 from castblast.progress import ProgressCallback, silent
+
+if TYPE_CHECKING:
+    from castblast.stages.outcome import Outcome
 
 #: First characters of a number.
 _NUMERIC = "+-.0123456789"
@@ -74,6 +77,20 @@ class Screen:
         for row in rows:
             table.add_row(*(Text(printable(cell)) for cell in row))
         Console(width=None if sys.stdout.isatty() else 120).print(table)
+
+    def show(self, outcome: "Outcome") -> Mapping[str, Any]:
+        """Show what a verb found and return its document; exit code 4 if something is wrong."""
+        if outcome.title or outcome.rows:
+            self.table(outcome.header, outcome.rows, title=outcome.title)
+        for line in outcome.faults:
+            self.fail(f"not ok: {line}")
+        for line in outcome.remarks:
+            self.note(line)
+        for line in (*outcome.lines, *(f"wrote {path}" for path in outcome.files)):
+            self.say(line)
+        if not outcome.ok:
+            self.exit_code = CheckError.exit_code
+        return outcome.document
 
     def document(self, payload: Mapping[str, Any]) -> None:
         """Print the result as JSON; NaN and infinity become null, as JSON has no such numbers."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from castblast.errors import CheckError
@@ -11,6 +10,7 @@ from castblast.explosive.finding import Finding, rejected, warned
 from castblast.explosive.isentrope import energy, in_hole_velocity, pressure, slope
 from castblast.specs.catalogue import explosive_names
 from castblast.specs.explosive import ExplosiveSpec, load_explosive
+from castblast.stages.outcome import Outcome
 
 #: Pressures [Pa] down to which the work of the products is shown.
 WORK_PRESSURES = (1e8, 2e7, 1e5)
@@ -18,30 +18,6 @@ WORK_PRESSURES = (1e8, 2e7, 1e5)
 SLOPE_VOLUMES = (1.0, 2.0, 3.3, 10.0)
 #: Hole diameter [m] at which the in-hole velocity is shown.
 SHOWN_DIAMETER = 0.15
-
-
-@dataclass(frozen=True)
-class CheckOutcome:
-    """What `check_explosive` found.
-
-    Attributes
-    ----------
-    title : str
-        Name of the explosive and the verdict.
-    rows : list of (relation, value, allowed, verdict)
-    rejected : list of str
-        One line per failed relation, with its value; empty: usable.
-    remedies : list of str
-        What would make rejected numbers fit.
-    document : dict
-        The same for machines.
-    """
-
-    title: str
-    rows: list[tuple[str, str, str, str]]
-    rejected: list[str]
-    remedies: list[str]
-    document: dict[str, Any]
 
 
 def catalogue() -> list[dict[str, Any]]:
@@ -118,7 +94,7 @@ def check(name_or_path: str) -> list[Finding]:
     return load_explosive(name_or_path).check()
 
 
-def check_explosive(name_or_path: str) -> CheckOutcome:
+def check_explosive(name_or_path: str) -> Outcome:
     """As `check`, in the form that the command line shows."""
     spec = load_explosive(name_or_path)
     findings = spec.check()
@@ -127,11 +103,13 @@ def check_explosive(name_or_path: str) -> CheckOutcome:
     verdict = (
         "inconsistent" if failed else "usable, with warnings" if warned(findings) else "consistent"
     )
-    return CheckOutcome(
+    return Outcome(
         title=f"{spec.name}: {verdict}",
+        header=("relation", "value", "allowed", "verdict"),
         rows=[(f.relation, f.shown_value, f.limit, f.level.value) for f in findings],
-        rejected=failed,
-        remedies=mends,
+        remarks=mends,
+        faults=failed,
+        ok=not failed,
         document={
             "name": spec.name,
             "verdict": verdict,

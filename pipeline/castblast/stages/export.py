@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from castblast.disk.files import write_json, write_with
 from castblast.disk.reading import read_json
@@ -21,6 +20,7 @@ from castblast.extras import require
 from castblast.network import Network
 from castblast.network.json_file import read_network
 from castblast.progress import ProgressCallback, silent
+from castblast.stages.outcome import Outcome
 from castblast.stages.training.fitting import FIT_FILE
 
 if TYPE_CHECKING:
@@ -35,15 +35,6 @@ _EXTRAS = {"excel": ("excel",)} | dict.fromkeys(
 )
 
 
-@dataclass(frozen=True)
-class ExportOutcome:
-    """What was written and how well it agrees: a document and lines for people."""
-
-    document: dict[str, Any]
-    lines: list[str]
-    files: list[Path] = field(default_factory=list)
-
-
 def export(
     fit: Path,
     out: Path | None = None,
@@ -53,7 +44,7 @@ def export(
     parity: Path | None = None,
     histories: Path | None = None,
     progress: ProgressCallback = silent,
-) -> ExportOutcome:
+) -> Outcome:
     """Write the network of a fit.
 
     Parameters
@@ -109,7 +100,7 @@ def export(
     if parity is not None:
         files.append(write_json(parity, documents))
     document = {"network": str(source), "files": [str(path) for path in files], "parity": documents}
-    return ExportOutcome(document, lines, files)
+    return Outcome(document=document, lines=lines)
 
 
 def _write(

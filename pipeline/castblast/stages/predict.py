@@ -6,29 +6,19 @@ Imports NumPy and light modules only, so that the command line answers in well u
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from castblast.bands import BAND_WORDS, show_band, show_value
+from castblast.bands import BAND_HEADER, BAND_WORDS, show_band, show_value
 from castblast.design.variables import VARIABLES
 from castblast.network import Network
 from castblast.prediction.answer import load_network, predict
-
-
-@dataclass(frozen=True)
-class Prediction:
-    """One answer: a document in SI units and the same for people."""
-
-    document: dict[str, Any]
-    title: str
-    rows: list[tuple[str, str, str, str]]
-    remarks: list[str]
+from castblast.stages.outcome import Outcome
 
 
 def predict_design(
     values: Mapping[str, Any], explosive: str, network: Path | None = None
-) -> Prediction:
+) -> Outcome:
     """Predict one design written with units, such as ``{"burden": "3 m"}``; see `predict`."""
     from castblast.specs.case import parse_values
 
@@ -42,7 +32,7 @@ def predict_design(
     if score is not None and document["in_domain"]:
         remarks.append(f"inside the training data: density score {score:.2f}, the limit is 1")
     title = f"{document['explosive']}, {document['model']['name']}"
-    return Prediction(document, title, rows, remarks)
+    return Outcome(document=document, title=title, header=BAND_HEADER, rows=rows, remarks=remarks)
 
 
 def domain_remarks(document: Mapping[str, Any]) -> list[str]:

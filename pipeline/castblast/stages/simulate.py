@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from castblast.bands import BAND_WORDS, band_document, show_band, show_value
+from castblast.bands import BAND_HEADER, BAND_WORDS, band_document, show_band, show_value
 from castblast.blast.inputs import resolve_inputs
 from castblast.blast.run import BlastResult, BlastSettings, make_case, result_values, run_blast
 from castblast.design.hole import expanded_hole_faults
@@ -23,18 +22,8 @@ from castblast.nearfield.case import EndMode, TensionMode
 from castblast.specs.case import parse_values
 from castblast.specs.explosive import load_explosive
 from castblast.stages.explosives import require_consistent
+from castblast.stages.outcome import Outcome
 from castblast.stopping import interruptible
-
-
-@dataclass(frozen=True)
-class SimulationOutcome:
-    """What `simulate` found: a document in SI units and the same for people."""
-
-    document: dict[str, Any]
-    title: str
-    rows: list[tuple[str, str, str, str]]
-    remarks: list[str] = field(default_factory=list)
-    files: list[Path] = field(default_factory=list)
 
 
 def simulate(
@@ -47,7 +36,7 @@ def simulate(
     where: str = "--set",
     allow_inconsistent: bool = False,
     out: Path | None = None,
-) -> SimulationOutcome:
+) -> Outcome:
     """Run near field and burden motion once.
 
     Parameters
@@ -107,7 +96,14 @@ def simulate(
     if out is not None:
         files = written_together(out, partial(_write, document=document, result=result))
     title = f"{spec.name}, {mode} mode, {parameter_set} parameters"
-    return SimulationOutcome(document, title, _rows(document), remarks, files)
+    return Outcome(
+        document=document,
+        title=title,
+        header=BAND_HEADER,
+        rows=_rows(document),
+        remarks=remarks,
+        files=files,
+    )
 
 
 def _document(

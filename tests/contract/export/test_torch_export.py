@@ -143,7 +143,7 @@ def test_a_module_of_any_shape_is_the_estimator(
     fit, folder = make(factory)
     assert fit.network is None
     outcome = export(folder, tmp_path, targets=("onnx",), parity=tmp_path / "parity.json")
-    assert [path.name for path in outcome.files] == ["model.onnx", "parity.json"]
+    assert [Path(path).name for path in outcome.document["files"]] == ["model.onnx", "parity.json"]
     found = outcome.document["parity"]["onnx"]
     assert found["passed"]
     assert found["golden_rows"] == 200

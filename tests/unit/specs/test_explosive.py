@@ -145,7 +145,7 @@ def test_table_of_a_jwl_set_gives_the_same_explosive(tmp_path: Path) -> None:
         energy(anfo.isentrope, 1.0) - energy(anfo.isentrope, 20.0), rel=1e-4
     )
     assert table.total_energy == pytest.approx(anfo.total_energy, rel=0.01)
-    assert check_explosive(path).rejected == []
+    assert check_explosive(path).faults == []
     assert describe(path)["form"] == "table"
 
 
@@ -205,5 +205,5 @@ def test_the_same_emulsion_is_usable_with_its_own_state(tmp_path: Path) -> None:
         "jwl": jwl,
     }
     outcome = check_explosive(written(tmp_path, content))
-    assert outcome.rejected == []
+    assert outcome.faults == []
     assert "warnings" in outcome.title

@@ -21,7 +21,7 @@ UNITS = ("c1_tnt_cmgus", "c1b_tnt_gcc", "c1e_tnt_cal", "c11_mwpa")
 def outcome(name: str) -> tuple[str, str, str]:
     """Verdict, failed relations with their fields, and what would fit."""
     found = check_explosive(str(CASES / f"{name}.yaml"))
-    return found.document["verdict"], "\n".join(found.rejected), "\n".join(found.remedies)
+    return found.document["verdict"], "\n".join(found.faults), "\n".join(found.remarks)
 
 
 @pytest.mark.parametrize("name", UNITS)

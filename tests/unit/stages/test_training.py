@@ -16,9 +16,10 @@ from castblast.errors import DatasetError, SpecError
 from castblast.prediction.answer import predict
 from castblast.stages.comparison.run import DEMO, compare
 from castblast.stages.export import export
+from castblast.stages.outcome import Outcome
 from castblast.stages.predict import predict_design
 from castblast.stages.predict_table import predict_csv
-from castblast.stages.training.train import TrainOutcome, train
+from castblast.stages.training.train import train
 
 MODELS = {
     "first": "kind: mlp\nmax_iterations: 80\ntarget_transform: log\ndescription: short\n",
@@ -54,7 +55,7 @@ def network(comparison: Path) -> Path:
     return comparison.parent / "chosen" / "network.json"
 
 
-def _compare(source, out: Path, **options: Any) -> TrainOutcome:
+def _compare(source, out: Path, **options: Any) -> Outcome:
     return compare(
         *source, out / "comparison", fits=out / "fits", extent=DEMO, workers=1, **options
     )

@@ -168,14 +168,14 @@ def test_other_code_does_not_extend(made, tmp_path):
 
 def test_diff_of_a_dataset_with_itself(made):
     outcome = diff_datasets(made, made)
-    assert outcome.same
+    assert outcome.ok
     assert outcome.lines[0].startswith("small/1.2.0: the same 60 samples")
-    assert outcome.rows == ()
+    assert not outcome.rows
 
 
 def test_diff_of_an_extension(made, extended):
     outcome = diff_datasets(made, extended)
-    assert not outcome.same
+    assert not outcome.ok
     text = "\n".join(outcome.lines)
     assert "size: 60 → 85" in text
     assert "version: 1.2.0 → 1.3.0" in text

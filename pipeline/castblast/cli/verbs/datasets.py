@@ -38,11 +38,7 @@ def describe(screen: Screen, dataset: _Dataset) -> Mapping[str, Any]:
     """Say what a dataset holds: size, ranges, failures, versions."""
     from castblast.stages.datasets.dataset import describe_dataset
 
-    description = describe_dataset(dataset)
-    for line in description.lines:
-        screen.say(line)
-    screen.table(description.header, description.rows)
-    return description.document
+    return screen.show(describe_dataset(dataset))
 
 
 @verb(app, needs=("simulate", "data"), compiles="nearfield")
@@ -54,12 +50,7 @@ def reproduce(
     """Recompute one sample from the file alone and compare it (exit code 4 if it differs)."""
     from castblast.stages.datasets.dataset import reproduce_sample
 
-    outcome = reproduce_sample(dataset, sample)
-    screen.table(("quantity", "stored", "recomputed", "relative difference"), outcome.rows)
-    screen.say(outcome.verdict)
-    if not outcome.same:
-        screen.exit_code = 4
-    return outcome.document
+    return screen.show(reproduce_sample(dataset, sample))
 
 
 @verb(app, needs=("simulate", "data"), compiles="nearfield")
@@ -99,9 +90,7 @@ def extend(
             restart=restart,
             progress=progress,
         )
-    for line in outcome.lines:
-        screen.say(line)
-    return outcome.document
+    return screen.show(outcome)
 
 
 @verb(app, needs=("simulate", "data"))
@@ -115,10 +104,4 @@ def diff(
 
     with screen.progress("diff") as progress:
         outcome = diff_datasets(first, second, progress)
-    for line in outcome.lines:
-        screen.say(line)
-    if outcome.rows:
-        screen.table(outcome.header, outcome.rows)
-    if not outcome.same:
-        screen.exit_code = 4
-    return outcome.document
+    return screen.show(outcome)

@@ -89,12 +89,4 @@ def check(screen: Screen, name: _Name) -> Mapping[str, Any]:
     """Check that an explosive's numbers belong together (exit code 4 if they do not)."""
     from castblast.stages.explosives import check_explosive
 
-    outcome = check_explosive(name)
-    screen.table(("relation", "value", "allowed", "verdict"), outcome.rows, title=outcome.title)
-    if outcome.rejected:
-        screen.exit_code = 4
-        for line in outcome.rejected:
-            screen.note(f"error: {line}")
-        for line in outcome.remedies:
-            screen.note(line)
-    return outcome.document
+    return screen.show(check_explosive(name))

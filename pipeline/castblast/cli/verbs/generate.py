@@ -35,9 +35,7 @@ def generate(
             restart=restart,
             progress=progress,
         )
-    for line in outcome.lines:
-        screen.say(line)
-    return outcome.document
+    return screen.show(outcome)
 
 
 def add_to(app: typer.Typer) -> None:

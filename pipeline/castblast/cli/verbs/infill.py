@@ -27,10 +27,7 @@ def infill(
         outcome = run(
             dataset, model, rows, out, members=members, allow_code=allow_code, progress=progress
         )
-    screen.table(outcome.header, outcome.rows)
-    for line in outcome.lines:
-        screen.say(line)
-    return outcome.document
+    return screen.show(outcome)
 
 
 def add_to(app: typer.Typer) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -10,10 +10,6 @@ from castblast.cli.options import OutFolder
 from castblast.cli.screen import Screen
 from castblast.cli.verb import verb
 from castblast.errors import SpecError
-
-if TYPE_CHECKING:
-    from castblast.stages.muckpile.results import MuckpileOutcome
-
 
 _Ore = Annotated[
     Path | None,
@@ -129,7 +125,7 @@ def muckpile(
             outcome = run_seeds(bench, out, seeds, progress=progress, **options)
         else:
             outcome = run_muckpile(bench, out, progress=progress, **options)
-    return _show(screen, outcome)
+    return screen.show(outcome)
 
 
 def compare_muckpiles(
@@ -140,7 +136,7 @@ def compare_muckpiles(
     """Compare finished muckpiles: mean and scatter of every metric, profiles over each other."""
     from castblast.stages.muckpile.compare import compare_runs
 
-    return _show(screen, compare_runs(folders, Path() if out is None else out))
+    return screen.show(compare_runs(folders, Path() if out is None else out))
 
 
 def measure_muckpile(
@@ -167,19 +163,7 @@ def measure_muckpile(
     from castblast.stages.muckpile.measure import measure_muckpile as measure
 
     extras = Extras(ore=ore, dig_block=dig_block, flitch=flitch)
-    return _show(screen, measure(bench, final, out, start=start, extras=extras))
-
-
-def _show(screen: Screen, outcome: "MuckpileOutcome") -> Mapping[str, Any]:
-    """Show the result; one that is not to be believed says why and ends with exit code 4."""
-    screen.table(("quantity", "value", "unit"), outcome.rows, title=outcome.title)
-    for line in outcome.remarks:
-        screen.note(line)
-    for path in outcome.files:
-        screen.say(f"wrote {path}")
-    if outcome.faults:
-        screen.fail(f"not ok: {'; '.join(outcome.faults)}")
-    return outcome.document
+    return screen.show(measure(bench, final, out, start=start, extras=extras))
 
 
 def add_to(app: typer.Typer) -> None:

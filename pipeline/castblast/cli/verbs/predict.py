@@ -40,7 +40,6 @@ def predict(
     the 5th to the 95th percentile of blasts, a prior before calibration. A design outside training
     data, or unusual among it, is called so, and the inputs at fault are named.
     """
-    from castblast.bands import BAND_TITLE
     from castblast.specs.case import parse_values, split_assignments
     from castblast.stages.predict import predict_design
 
@@ -64,11 +63,7 @@ def predict(
             return {"rows": table.rows}
         screen.say(table.text.rstrip())
         return {}
-    answer = predict_design(given, explosive, network)
-    screen.table(("quantity", "value", BAND_TITLE, "unit"), answer.rows, title=answer.title)
-    for line in answer.remarks:
-        screen.note(line)
-    return answer.document
+    return screen.show(predict_design(given, explosive, network))
 
 
 def add_to(app: typer.Typer) -> None:

@@ -52,7 +52,6 @@ def simulate(
     out: OutFolder = None,
 ) -> Mapping[str, Any]:
     """Simulate one blast: near field, then burden motion; pictures and histories with --out."""
-    from castblast.bands import BAND_TITLE
     from castblast.specs.case import read_case, split_assignments
     from castblast.stages.simulate import simulate as run
 
@@ -68,12 +67,7 @@ def simulate(
         allow_inconsistent=allow_inconsistent,
         out=out,
     )
-    for line in outcome.remarks:
-        screen.note(line)
-    screen.table(("quantity", "value", BAND_TITLE, "unit"), outcome.rows, title=outcome.title)
-    for path in outcome.files:
-        screen.say(f"wrote {path}")
-    return outcome.document
+    return screen.show(outcome)
 
 
 def add_to(app: typer.Typer) -> None:

@@ -2,16 +2,13 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from castblast.cli.options import AllowCode, OutFolder
 from castblast.cli.screen import Screen
 from castblast.cli.verb import verb
-
-if TYPE_CHECKING:
-    from castblast.stages.training.train import TrainOutcome
 
 _Dataset = Annotated[Path, typer.Argument(help="Dataset (netCDF).")]
 _Tracking = Annotated[
@@ -62,7 +59,7 @@ def train(
             allow_code=allow_code,
             progress=progress,
         )
-    return _show(screen, outcome)
+    return screen.show(outcome)
 
 
 def tune(
@@ -104,7 +101,7 @@ def tune(
             allow_code=allow_code,
             progress=progress,
         )
-    return _show(screen, outcome)
+    return screen.show(outcome)
 
 
 def compare(
@@ -152,9 +149,7 @@ def compare(
             allow_code=allow_code,
             progress=progress,
         )
-    if outcome.document["chosen"] is None:
-        screen.exit_code = 4
-    return _show(screen, outcome)
+    return screen.show(outcome)
 
 
 def runs(
@@ -177,7 +172,7 @@ def runs(
     from castblast.stages.training.runs import list_runs
 
     outcome = list_runs(folder, experiment=experiment, stage=stage, sort=sort, limit=limit)
-    return _show(screen, outcome)
+    return screen.show(outcome)
 
 
 def export(
@@ -213,9 +208,7 @@ def export(
         outcome = run(
             fit, out, targets=to.split(","), verify=verify, histories=histories, progress=progress
         )
-    for line in outcome.lines:
-        screen.say(line)
-    return outcome.document
+    return screen.show(outcome)
 
 
 def _is_tracked(screen: Screen, wanted: bool | None) -> bool:
@@ -225,13 +218,6 @@ def _is_tracked(screen: Screen, wanted: bool | None) -> bool:
     if wanted is None and not is_installed("mlflow"):
         screen.note(f"no record of the runs is kept: {install_command(['mlflow'])} for one")
     return is_installed("mlflow") if wanted is None else wanted
-
-
-def _show(screen: Screen, outcome: "TrainOutcome") -> Mapping[str, Any]:
-    screen.table(outcome.header, outcome.rows, title=outcome.title)
-    for line in outcome.lines:
-        screen.say(line)
-    return outcome.document
 
 
 def add_to(app: typer.Typer) -> None:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from castblast.disk.files import write_csv, write_json, write_text
 from castblast.stages.comparison.page import write_costs, write_page
+from castblast.stages.outcome import Outcome
 from castblast.stages.training.fitting import fit_title, held_out
-from castblast.stages.training.train import TrainOutcome, show_r_squared, show_share
+from castblast.stages.training.train import show_r_squared, show_share
 
 if TYPE_CHECKING:
     from castblast.stages.comparison.found import Comparison
@@ -149,7 +150,7 @@ def _draw(out: Path, found: Comparison, document: Mapping[str, Any]) -> list[Pat
     return files
 
 
-def outcome(found: Comparison, document: Mapping[str, Any], out: Path) -> TrainOutcome:
+def outcome(found: Comparison, document: Mapping[str, Any], out: Path) -> Outcome:
     """Give what the screen shows of a comparison."""
     league = found.league
     paper = league["paper"]
@@ -175,7 +176,14 @@ def outcome(found: Comparison, document: Mapping[str, Any], out: Path) -> TrainO
         figures = [f"{paper['r2']:.4f}", f"{paper['relative_error_95']:.1%}"]
         rows.append([f"paper, {paper['runs']:,} runs", "", "", *figures, *("" for _ in others)])
     title = f"{league['test_rows']:,} test rows never trained on"
-    return TrainOutcome({**document, "out": str(out)}, title, header, rows, _lines(found, out))
+    return Outcome(
+        document={**document, "out": str(out)},
+        title=title,
+        header=header,
+        rows=rows,
+        lines=_lines(found, out),
+        ok=league["chosen"] is not None,
+    )
 
 
 def _lines(found: Comparison, out: Path) -> list[str]:

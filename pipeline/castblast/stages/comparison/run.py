@@ -27,6 +27,7 @@ from castblast.stages.comparison.parts import (
     shift_part,
     sobol_part,
 )
+from castblast.stages.outcome import Outcome
 from castblast.stages.reuse import file_hash
 from castblast.stages.training.fitting import (
     fit_all,
@@ -37,7 +38,7 @@ from castblast.stages.training.fitting import (
     require_training,
     without_missing,
 )
-from castblast.stages.training.train import RUNS_FOLDER, TrainOutcome
+from castblast.stages.training.train import RUNS_FOLDER
 
 if TYPE_CHECKING:
     from castblast.specs.models.model import ModelSpec
@@ -78,7 +79,7 @@ def compare(
     runs: Path = RUNS_FOLDER,
     allow_code: bool = False,
     progress: ProgressCallback = silent,
-) -> TrainOutcome:
+) -> Outcome:
     """Fit what is not fitted yet, judge all models and choose one.
 
     A model whose library is not installed is left out, and a remark names the extra.

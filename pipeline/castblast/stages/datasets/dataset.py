@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -24,29 +22,10 @@ from castblast.kernel import source_hash
 from castblast.names import printable
 from castblast.progress import ProgressCallback, silent
 from castblast.specs.recipe import recipe_from_text
+from castblast.stages.outcome import Outcome
 
 #: Deviation up to which a recomputed number is the same: last digits differ between processors.
 SAME = 1e-10
-
-
-@dataclass(frozen=True)
-class Description:
-    """A dataset in words: lines, a table of its variables, and all of it for programs."""
-
-    lines: tuple[str, ...]
-    header: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    document: dict[str, Any]
-
-
-@dataclass(frozen=True)
-class Reproduction:
-    """A stored sample beside the same sample computed again."""
-
-    same: bool
-    verdict: str
-    rows: tuple[tuple[str, ...], ...]
-    document: dict[str, Any]
 
 
 def check_dataset(path: Path, progress: ProgressCallback = silent) -> list[str]:
@@ -61,7 +40,7 @@ def check_dataset(path: Path, progress: ProgressCallback = silent) -> list[str]:
         return [str(fault) for fault in check(dataset, progress)]
 
 
-def describe_dataset(path: Path) -> Description:
+def describe_dataset(path: Path) -> Outcome:
     """Say what a dataset holds: rows, splits, failures, ranges, where it comes from.
 
     Raises
@@ -74,7 +53,7 @@ def describe_dataset(path: Path) -> Description:
         return _describe(dataset, path)
 
 
-def _describe(dataset: xr.Dataset, path: Path) -> Description:
+def _describe(dataset: xr.Dataset, path: Path) -> Outcome:
     attributes = dataset.attrs
     counts = {name: flag_counts(dataset[name]) for name in ("explosive", "split", "status")}
     variables = {
@@ -82,7 +61,7 @@ def _describe(dataset: xr.Dataset, path: Path) -> Description:
         for role in ("input", "derived", "fixed", "target", "diagnostic")
         for name in names_with_role(dataset, role)
     }
-    lines = (
+    lines = [
         f"{attributes['id']}: {attributes['title']}",
         summary(dataset["status"].to_numpy()),
         *(
@@ -91,8 +70,8 @@ def _describe(dataset: xr.Dataset, path: Path) -> Description:
         ),
         f"made by castblast {attributes['castblast_version']}, content "
         f"{attributes['content_sha256']}",
-    )
-    rows = tuple(
+    ]
+    rows = [
         (
             name,
             str(entry["role"]),
@@ -104,7 +83,7 @@ def _describe(dataset: xr.Dataset, path: Path) -> Description:
         )
         for name, entry in variables.items()
         if entry["role"] != "fixed"
-    )
+    ]
     header = ("variable", "role", "unit", "mean", "std", "min", "max")
     document = {
         "dataset": str(path),
@@ -115,10 +94,10 @@ def _describe(dataset: xr.Dataset, path: Path) -> Description:
         "content_sha256": attributes["content_sha256"],
         "recipe_sha256": attributes["recipe_sha256"],
     }
-    return Description(lines, header, rows, document)
+    return Outcome(document=document, header=header, rows=rows, lines=lines)
 
 
-def reproduce_sample(path: Path, sample: int) -> Reproduction:
+def reproduce_sample(path: Path, sample: int) -> Outcome:
     """Compute one sample again from the file alone and compare every output.
 
     Parameters
@@ -159,10 +138,11 @@ def reproduce_sample(path: Path, sample: int) -> Reproduction:
     verdict = f"sample {sample}: " + _verdict(same, statuses, worst, deviations[worst])
     if not same and stored.attrs["source_sha256"] != source_hash(SOURCES):
         verdict += "; the code of the physics is not the one that made the file"
-    rows = tuple(
+    rows = [
         (key, *(VARIABLES[key].show(value) for value in values[key]), f"{deviations[key]:.1e}")
         for key in OUTPUT_NAMES
-    )
+    ]
+    header = ("quantity", "stored", "recomputed", "relative difference")
     document = {
         "dataset": str(path),
         "sample": sample,
@@ -172,7 +152,7 @@ def reproduce_sample(path: Path, sample: int) -> Reproduction:
         "recomputed": {key: pair[1] for key, pair in values.items()},
         "relative_difference": deviations,
     }
-    return Reproduction(same, verdict, rows, document)
+    return Outcome(document=document, header=header, rows=rows, lines=[verdict], ok=same)
 
 
 def _position(dataset: xr.Dataset, sample: int, path: Path) -> int:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,20 +10,10 @@ from numpy.typing import NDArray
 from castblast.dataset.file.compare import Comparison, compare
 from castblast.dataset.file.store import reading_dataset
 from castblast.progress import ProgressCallback, silent
+from castblast.stages.outcome import Outcome
 
 
-@dataclass(frozen=True)
-class Differences:
-    """Two datasets side by side."""
-
-    same: bool
-    lines: tuple[str, ...]
-    header: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    document: dict[str, Any]
-
-
-def diff_datasets(first: Path, second: Path, progress: ProgressCallback = silent) -> Differences:
+def diff_datasets(first: Path, second: Path, progress: ProgressCallback = silent) -> Outcome:
     """Compare two datasets: what they were made from, their form, their rows and values.
 
     Raises
@@ -58,7 +46,7 @@ def diff_datasets(first: Path, second: Path, progress: ProgressCallback = silent
             for column in found.columns
         },
     }
-    rows = tuple(
+    rows = [
         (
             column.name,
             str(column.rows),
@@ -66,14 +54,15 @@ def diff_datasets(first: Path, second: Path, progress: ProgressCallback = silent
             "" if column.sample is None else str(column.sample),
         )
         for column in found.columns
-    )
+    ]
     header = ("variable", "rows that differ", "largest relative difference", "sample")
-    return Differences(found.same, _lines(ids, content, found), header, rows, document)
+    lines = _lines(ids, content, found)
+    return Outcome(document=document, header=header, rows=rows, lines=lines, ok=found.same)
 
 
-def _lines(ids: list[str], content: list[str], found: Comparison) -> tuple[str, ...]:
+def _lines(ids: list[str], content: list[str], found: Comparison) -> list[str]:
     if found.same:
-        return (f"{ids[0]}: the same {found.common} samples, content {content[0][:12]}",)
+        return [f"{ids[0]}: the same {found.common} samples, content {content[0][:12]}"]
     lines = [f"{ids[0]} ({content[0][:12]}) → {ids[1]} ({content[1][:12]})"]
     for title, entries in (
         ("made from", found.making),
@@ -88,7 +77,7 @@ def _lines(ids: list[str], content: list[str], found: Comparison) -> tuple[str, 
     )
     if not found.columns and found.common:
         lines.append(f"the {found.common} common samples are equal in every value")
-    return tuple(lines)
+    return lines
 
 
 def _ids(ids: NDArray[np.integer], where: str) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,26 +25,18 @@ from castblast.dataset.rows.simulation import Simulator, blast_simulator
 from castblast.disk.plain import as_plain
 from castblast.progress import ProgressCallback, silent
 from castblast.specs.recipe import RecipeSource, load_recipe
+from castblast.stages.outcome import Outcome
 
 CARD_NAME = "DATASHEET.md"
 
 
-@dataclass(frozen=True)
-class GenerateOutcome(os.PathLike[str]):
-    """What was generated; stands for the path of the dataset where a path is needed.
+class GenerateOutcome(Outcome, os.PathLike[str]):
+    """What was generated; stands for the path of the dataset where a path is needed."""
 
-    Attributes
-    ----------
-    path : Path
-    lines : tuple of str
-        What was done, for people.
-    document : dict
-        The same for programs.
-    """
-
-    path: Path
-    lines: tuple[str, ...]
-    document: dict[str, Any]
+    @property
+    def path(self) -> Path:
+        """The dataset."""
+        return Path(self.document["path"])
 
     def __fspath__(self) -> str:
         """Path of the dataset."""
@@ -139,7 +130,7 @@ def produce(
 def already_finished(path: Path) -> GenerateOutcome:
     """Leave a dataset alone that is there, whole, and made from the same."""
     line = f"{path}: finished already, from the same recipe"
-    return GenerateOutcome(path, (line,), _document(path))
+    return GenerateOutcome(document=_document(path), lines=[line])
 
 
 def finish(path: Path, content: str, lines: list[str]) -> GenerateOutcome:
@@ -151,7 +142,7 @@ def finish(path: Path, content: str, lines: list[str]) -> GenerateOutcome:
         f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB, content {content[:12]}) and "
         f"{card.name}; peak {peak_memory() / 1e6:.0f} MB"
     )
-    return GenerateOutcome(path, (*lines, wrote), _document(path))
+    return GenerateOutcome(document=_document(path), lines=[*lines, wrote])
 
 
 def output_path(source: RecipeSource, out: Path | None) -> Path:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -20,22 +18,13 @@ from castblast.network import Network, explosive_index, member_spread
 from castblast.progress import ProgressCallback, part, silent
 from castblast.specs.models.model import ModelSpec, make_model_spec, read_model_spec, refuse_code
 from castblast.specs.recipe import Recipe
+from castblast.stages.outcome import Outcome
 from castblast.surrogate.searching.infill import POOL_FACTOR, choose_batch, infill_worth
 from castblast.types import FloatArray
 
 #: Batch numbers from here on are for pools: no dataset gets that far, so a later extension never
 #: draws the numbers of a pool again.
 _POOL_BATCH = 20_000
-
-
-@dataclass(frozen=True)
-class InfillOutcome:
-    """Chosen designs: what is known of them, and the same for people."""
-
-    document: dict[str, Any]
-    header: tuple[str, ...]
-    rows: list[tuple[str, str, str, str]]
-    lines: list[str]
 
 
 def infill(
@@ -47,7 +36,7 @@ def infill(
     members: int = 3,
     allow_code: bool = False,
     progress: ProgressCallback = silent,
-) -> InfillOutcome:
+) -> Outcome:
     """Choose the next designs to simulate and write them as a design file.
 
     Parameters
@@ -162,7 +151,7 @@ def _find_model(model: Path) -> Network | ModelSpec:
 
 def _outcome(
     dataset: Path, out: Path, targets: tuple[str, ...], usual: FloatArray, spread: FloatArray
-) -> InfillOutcome:
+) -> Outcome:
     """Say how much wider the spread is where the new rows lie."""
     medians = np.median(spread, axis=0)
     rows = [
@@ -181,4 +170,4 @@ def _outcome(
         f"simulate and join them: castblast dataset extend {dataset} --design {out}",
     ]
     header = ("target", "median spread of candidates", "of chosen", "ratio")
-    return InfillOutcome(document, header, rows, lines)
+    return Outcome(document=document, header=header, rows=rows, lines=lines)

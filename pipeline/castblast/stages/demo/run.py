@@ -7,7 +7,7 @@ second run reuses what is still valid.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -86,7 +86,7 @@ def _make_dataset(demo: Demo, progress: ProgressCallback) -> list[str]:
     except StaleResultError:
         # The folder is the demo's own: what an older castblast left there is made again.
         outcome = make(restart=True)
-    return list(outcome.lines)
+    return outcome.lines
 
 
 def _train(demo: Demo, progress: ProgressCallback) -> list[str]:
@@ -112,7 +112,7 @@ def _train(demo: Demo, progress: ProgressCallback) -> list[str]:
     return [_league_line(row) for row in outcome.rows] + outcome.lines
 
 
-def _league_line(row: list[str]) -> str:
+def _league_line(row: Sequence[str]) -> str:
     """Model, physics gate, R² and 95 % error of the burden velocity."""
     name, gate, _, r_squared, error, *_ = row
     return f"{name:22s} {gate:8s} burden velocity R², 95 % error: {r_squared}, {error}"

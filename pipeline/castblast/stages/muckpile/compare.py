@@ -19,13 +19,14 @@ from castblast.muckpile.results.profile import Profile
 from castblast.progress import ProgressCallback, silent
 from castblast.specs.bench.bench import BenchSpec
 from castblast.stages.muckpile.read import FinishedRun, numbers, read_runs
-from castblast.stages.muckpile.results import MuckpileOutcome, bench_content
+from castblast.stages.muckpile.results import HEADER, bench_content
+from castblast.stages.outcome import Outcome
 from castblast.stages.reuse import forget, is_valid, make_key, mark_valid
 
 _PER_BLOCK = ("block_throw", "block_spread")
 
 
-def compare_runs(folders: Sequence[Path], out: Path) -> MuckpileOutcome:
+def compare_runs(folders: Sequence[Path], out: Path) -> Outcome:
     """Compare finished runs, such as one bench with several seeds, or a bench with variants.
 
     Parameters
@@ -37,7 +38,7 @@ def compare_runs(folders: Sequence[Path], out: Path) -> MuckpileOutcome:
 
     Returns
     -------
-    MuckpileOutcome
+    Outcome
         `document` holds ``ok``, ``faults`` (of the runs), ``runs`` (name to headline metrics),
         ``bands`` (metric to mean, sd and number of runs that know it) and ``units``.
 
@@ -74,7 +75,15 @@ def compare_runs(folders: Sequence[Path], out: Path) -> MuckpileOutcome:
         ],
     )
     title = f"{len(folders)} runs: mean and standard deviation"
-    return MuckpileOutcome(document, title, band_rows(bands), files, faults=faults)
+    return Outcome(
+        document=document,
+        title=title,
+        header=HEADER,
+        rows=band_rows(bands),
+        files=files,
+        faults=faults,
+        ok=not faults,
+    )
 
 
 def _run_faults(names: Sequence[str], documents: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -93,7 +102,7 @@ def run_seeds(
     *,
     progress: ProgressCallback = silent,
     **options: Any,
-) -> MuckpileOutcome:
+) -> Outcome:
     """Run a bench with several seeds, from that of its file on, and compare the runs.
 
     Seeds that were finished before a stop are not run again.

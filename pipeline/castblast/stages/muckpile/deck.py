@@ -11,7 +11,8 @@ from castblast.export.engines.lammps_deck import write_lammps_deck
 from castblast.export.engines.liggghts_deck import write_liggghts_deck
 from castblast.muckpile.cast.solver import CastCase
 from castblast.specs.bench.bench import BenchSpec
-from castblast.stages.muckpile.results import MuckpileOutcome
+from castblast.stages.muckpile.results import HEADER
+from castblast.stages.outcome import Outcome
 
 
 class Decks(NamedTuple):
@@ -26,7 +27,7 @@ class Decks(NamedTuple):
         return self.lammps is not None or self.liggghts is not None
 
 
-def write_decks(spec: BenchSpec, case: CastCase, decks: Decks) -> MuckpileOutcome:
+def write_decks(spec: BenchSpec, case: CastCase, decks: Decks) -> Outcome:
     """Write the input of other engines for exactly the case that would be run.
 
     Raises
@@ -52,4 +53,4 @@ def write_decks(spec: BenchSpec, case: CastCase, decks: Decks) -> MuckpileOutcom
     ]
     document = {"bench": spec.name, "balls": balls, "files": [str(path) for path in files]}
     title = f"{spec.name}: {balls:,} balls, packed and not thrown"
-    return MuckpileOutcome(document, title, rows, files)
+    return Outcome(document=document, title=title, header=HEADER, rows=rows, files=files)

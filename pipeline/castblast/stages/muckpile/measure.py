@@ -28,8 +28,8 @@ from castblast.stages.muckpile.extras import Extras, read_extras
 from castblast.stages.muckpile.ore import OreRun, describe_ore
 from castblast.stages.muckpile.results import (
     DOCUMENT_UNITS,
+    HEADER,
     OPTIONAL_FILES,
-    MuckpileOutcome,
     metric_rows,
 )
 from castblast.stages.muckpile.run import bench_surroundings
@@ -42,6 +42,7 @@ from castblast.stages.muckpile.tables import (
     profile_columns,
 )
 from castblast.stages.muckpile.velocity import describe_velocity, velocity_remarks
+from castblast.stages.outcome import Outcome
 from castblast.stages.reuse import file_hash
 
 #: Where decks of castblast keep the balls before firing, beside the final state.
@@ -74,7 +75,7 @@ def measure_muckpile(
     *,
     start: Path | None = None,
     extras: Extras = Extras(),  # noqa: B008 - a record of constants
-) -> MuckpileOutcome:
+) -> Outcome:
     """Measure the pile that another engine made of a bench, as if it were our own run.
 
     Parameters
@@ -93,7 +94,7 @@ def measure_muckpile(
 
     Returns
     -------
-    MuckpileOutcome
+    Outcome
         Its folder has ``metrics.json``, ``profile.csv``, ``blocks.csv``, the surface, the state
         and pictures, as `compare-muckpiles` takes them; no history and no energies, which no file
         of balls holds.
@@ -151,12 +152,13 @@ def measure_muckpile(
     ):
         files = [folder / name.relative_to(scratch) for name in _write(scratch, found, document)]
     rows = metric_rows(document | {"ledger": {"residual": None}})
-    return MuckpileOutcome(
-        document,
-        f"{spec.name}: {len(after.radius):,} balls of {final.name}",
-        [row for row in rows if row[0] != _ENERGY_ROW],
-        files,
-        [*around.remarks, *velocity_remarks(plan.prediction)],
+    return Outcome(
+        document=document,
+        title=f"{spec.name}: {len(after.radius):,} balls of {final.name}",
+        header=HEADER,
+        rows=[row for row in rows if row[0] != _ENERGY_ROW],
+        files=files,
+        remarks=[*around.remarks, *velocity_remarks(plan.prediction)],
     )
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +30,7 @@ from castblast.stages.muckpile.tables import (
 )
 from castblast.stages.muckpile.velocity import describe_velocity, velocity_remarks, velocity_words
 from castblast.stages.muckpile.verdict import cast_faults
+from castblast.stages.outcome import Outcome
 from castblast.stages.reuse import file_hash
 
 #: Files that some runs write and others do not: they never stay beside those of another run.
@@ -57,21 +57,8 @@ DOCUMENT_UNITS = {
     "ore": "m, m2, kg; grades as given",
     "seconds": "s",
 }
-
-
-@dataclass(frozen=True)
-class MuckpileOutcome:
-    """What a run found: a document in SI units, the same for people, and the files written.
-
-    `faults` are reasons not to believe it.
-    """
-
-    document: dict[str, Any]
-    title: str
-    rows: list[tuple[str, str, str]]
-    files: list[Path] = field(default_factory=list)
-    remarks: list[str] = field(default_factory=list)
-    faults: list[str] = field(default_factory=list)
+#: Head of the table of a run.
+HEADER = ("quantity", "value", "unit")
 
 
 def describe_run(
@@ -82,7 +69,7 @@ def describe_run(
     result: CastResult,
     metrics: PileMetrics,
     ore: OreRun | None = None,
-) -> MuckpileOutcome:
+) -> Outcome:
     """Put the results of a run into a document and rows for people; NaN where nothing is known."""
     counters = result.counters._asdict()
     seconds = counters.pop("seconds")
@@ -118,7 +105,15 @@ def describe_run(
     if Status(result.status) is Status.NOT_CONVERGED:
         title += " (longest time reached before the pile came to rest)"
     remarks = velocity_remarks(prediction)
-    return MuckpileOutcome(plain, title, metric_rows(plain), remarks=remarks, faults=faults)
+    return Outcome(
+        document=plain,
+        title=title,
+        header=HEADER,
+        rows=metric_rows(plain),
+        remarks=remarks,
+        faults=faults,
+        ok=not faults,
+    )
 
 
 def bench_content(spec: BenchSpec, beside: Path) -> dict[str, Any]:

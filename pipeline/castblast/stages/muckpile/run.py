@@ -39,12 +39,12 @@ from castblast.stages.muckpile.frames import Frames
 from castblast.stages.muckpile.ore import follow_ore
 from castblast.stages.muckpile.results import (
     OPTIONAL_FILES,
-    MuckpileOutcome,
     bench_content,
     describe_run,
     write_results,
 )
 from castblast.stages.muckpile.velocity import velocity_remarks
+from castblast.stages.outcome import Outcome
 from castblast.stopping import StopRequest, deferred_stop
 
 _PACKING_SHARE, _CAST_SHARE = 0.25, 0.95
@@ -67,7 +67,7 @@ def run_muckpile(
     extras: Extras = Extras(),  # noqa: B008 - a record of constants
     decks: Decks = Decks(),  # noqa: B008 - a record of constants
     progress: ProgressCallback = silent,
-) -> MuckpileOutcome:
+) -> Outcome:
     """Run a bench file; a run that was stopped goes on where it was, to the same numbers.
 
     Results appear together when all of them are written; until then those of an earlier run stay.
@@ -191,7 +191,7 @@ def _prepare(
 
 def _throw(
     job: _Job, start: Start, case: CastCase, more: dict[str, Any], progress: ProgressCallback
-) -> MuckpileOutcome:
+) -> Outcome:
     """Simulate the cast and write all results at once; only then is its restart file removed."""
     spec, wanted = job.spec, job.wanted
     # Frames of a run that was stopped wait for it beside its restart file.
@@ -212,7 +212,7 @@ def _throw(
         ore = follow_ore(wanted.ore, wanted.plan, case, result)
         plan = job.plan
         outcome = describe_run(spec, plan.speed, plan.prediction, start, result, metrics, ore)
-        outcome = _with_remarks(replace(outcome, document=outcome.document | more), job.ground)
+        outcome = _with_remarks(replace(outcome, document={**outcome.document, **more}), job.ground)
         files = write_results(scratch, spec, case, result, outcome.document, ore, plan.label)
         files += frames
     job.restart.unlink(missing_ok=True)
@@ -220,11 +220,11 @@ def _throw(
     return replace(outcome, files=[job.folder / path.relative_to(scratch) for path in files])
 
 
-def _with_remarks(outcome: MuckpileOutcome, ground: Ground) -> MuckpileOutcome:
+def _with_remarks(outcome: Outcome, ground: Ground) -> Outcome:
     """Outcome that says what was mended, left out or found odd in files of ground."""
     if not ground.remarks:
         return outcome
-    document = outcome.document | {"ground_remarks": list(ground.remarks)}
+    document = {**outcome.document, "ground_remarks": list(ground.remarks)}
     return replace(outcome, document=document, remarks=[*ground.remarks, *outcome.remarks])
 
 

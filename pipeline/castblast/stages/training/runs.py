@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from castblast.errors import SpecError, nearest_name
-from castblast.stages.training.train import RUNS_FOLDER, TrainOutcome
+from castblast.stages.outcome import Outcome
+from castblast.stages.training.train import RUNS_FOLDER
 
 if TYPE_CHECKING:
     from castblast.surrogate.keeping.run_list import RunEntry
@@ -23,7 +24,7 @@ def list_runs(
     stage: str | None = None,
     sort: str | None = None,
     limit: int | None = None,
-) -> TrainOutcome:
+) -> Outcome:
     """List runs, newest first or by a metric.
 
     Parameters
@@ -60,7 +61,8 @@ def list_runs(
     header = ["run", "stage", "experiment", "started (UTC)", "status", "seconds", metric]
     title = f"{len(shown)} of {len(entries)} runs in {runs}"
     document = {"runs": [entry._asdict() for entry in shown]}
-    return TrainOutcome(document, title, header, [_row(entry, metric) for entry in shown])
+    rows = [_row(entry, metric) for entry in shown]
+    return Outcome(document=document, title=title, header=header, rows=rows)
 
 
 def _grouped(entries: Sequence[RunEntry]) -> list[RunEntry]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from math import floor
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from castblast.disk.resources import resource
 from castblast.progress import ProgressCallback, silent
+from castblast.stages.outcome import Outcome
 from castblast.stages.training.fitting import (
     fit_all,
     fit_files,
@@ -25,17 +25,6 @@ if TYPE_CHECKING:
 RUNS_FOLDER = Path("runs")
 
 
-@dataclass(frozen=True)
-class TrainOutcome:
-    """What a verb found: a document and the same for people."""
-
-    document: dict[str, Any]
-    title: str
-    header: list[str]
-    rows: list[list[str]]
-    lines: list[str] = field(default_factory=list)
-
-
 def train(
     dataset: Path,
     specs: Sequence[Path],
@@ -46,7 +35,7 @@ def train(
     runs: Path = RUNS_FOLDER,
     allow_code: bool = False,
     progress: ProgressCallback = silent,
-) -> TrainOutcome:
+) -> Outcome:
     """Fit every spec and score it on rows never trained on; fits that are there stay.
 
     Parameters
@@ -97,7 +86,7 @@ def train(
     return _outcome(fits, out)
 
 
-def _outcome(fits: Sequence[Fit], out: Path) -> TrainOutcome:
+def _outcome(fits: Sequence[Fit], out: Path) -> Outcome:
     targets = list(dict.fromkeys(name for fit in fits for name in fit.table.target_names))
     header = ["model", "rows", *(f"{name.replace('_', ' ')}: R², 95 %" for name in targets)]
     rows = []
@@ -117,7 +106,7 @@ def _outcome(fits: Sequence[Fit], out: Path) -> TrainOutcome:
         "seconds": {fit.spec.name: fit.seconds for fit in fits},
     }
     lines = [f"wrote {out}", f"next: castblast compare, which ranks what lies in {out}"]
-    return TrainOutcome(document, title, header, rows, lines)
+    return Outcome(document=document, title=title, header=header, rows=rows, lines=lines)
 
 
 def show_r_squared(value: float | None) -> str:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from castblast.disk.files import write_json, write_text
 from castblast.progress import ProgressCallback, silent
+from castblast.stages.outcome import Outcome
 from castblast.stages.training.fitting import read_rows, require_training
-from castblast.stages.training.train import RUNS_FOLDER, TrainOutcome, show_share
+from castblast.stages.training.train import RUNS_FOLDER, show_share
 
 if TYPE_CHECKING:
     from castblast.specs.models.model import ModelSpec
@@ -30,7 +31,7 @@ def tune(
     runs: Path = RUNS_FOLDER,
     allow_code: bool = False,
     progress: ProgressCallback = silent,
-) -> TrainOutcome:
+) -> Outcome:
     """Search the space that a spec declares under ``search``.
 
     Parameters
@@ -155,7 +156,7 @@ def _content(spec: ModelSpec) -> dict[str, Any]:
     return {"kind": content.pop("kind"), "description": tuned, **content}
 
 
-def _outcome(result: StudyResult, folder: Path, journal: Path) -> TrainOutcome:
+def _outcome(result: StudyResult, folder: Path, journal: Path) -> Outcome:
     finished = sorted(
         (trial for trial in result.trials if trial.error is not None),
         key=lambda trial: (trial.error, trial.number),
@@ -184,7 +185,13 @@ def _outcome(result: StudyResult, folder: Path, journal: Path) -> TrainOutcome:
         f"the same command with more --trials goes on from {journal}",
     ]
     document = {**study_document(result), "out": str(folder), "journal": str(journal)}
-    return TrainOutcome(document, "Best trials, validation rows", header, rows, lines)
+    return Outcome(
+        document=document,
+        title="Best trials, validation rows",
+        header=header,
+        rows=rows,
+        lines=lines,
+    )
 
 
 def _show(value: Any) -> str:
