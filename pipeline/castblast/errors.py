@@ -40,9 +40,30 @@ _MEANINGS = {
 
 
 class CastblastError(Exception):
-    """A fault that a user can mend; `exit_code` is what the command line returns."""
+    """A fault that a user can mend; `exit_code` is what the command line returns.
+
+    Attributes
+    ----------
+    field : str or None
+        Name of the field, column or option at fault; of the first one, where several are; None
+        where no single one is.
+    value : object
+        What was given there.
+    allowed : object
+        What is allowed there: words for a range, or the names to choose from.
+    """
 
     exit_code = 2
+
+    def __init__(
+        self,
+        *message: object,
+        field: str | None = None,
+        value: object = None,
+        allowed: object = None,
+    ) -> None:
+        super().__init__(*message)
+        self.field, self.value, self.allowed = field, value, allowed
 
 
 class SpecError(CastblastError):

@@ -50,6 +50,14 @@ def test_start_up_times() -> None:
     assert _fastest([sys.executable, "-m", "castblast", "predict"]) < 1.0
 
 
+def test_the_python_face_costs_nothing_until_it_is_used() -> None:
+    """`import castblast` loads no array library, and names its whole face all the same."""
+    loaded = _modules_after("import castblast\nassert 'simulate' in dir(castblast)")
+    assert not loaded & {*HEAVY, "numpy", "pydantic", "yaml", "pint", "matplotlib"}
+    bare = _fastest([sys.executable, "-c", "pass"])
+    assert _fastest([sys.executable, "-c", "import castblast"]) - bare < 0.05
+
+
 def test_no_second_copy_of_the_package() -> None:
     """The source root `pipeline/` must never be imported as a package of its own."""
     assert not [name for name in sys.modules if name.split(".")[0] == "pipeline"]

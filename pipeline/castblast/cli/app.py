@@ -27,7 +27,7 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:
     if wanted:
-        from castblast import __version__
+        from castblast.version import __version__
 
         print(f"castblast {__version__}")
         raise typer.Exit

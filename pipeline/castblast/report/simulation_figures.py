@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
+from matplotlib.figure import Figure
+
 from castblast.bands import BAND_TITLE, BASIS, prediction_band, show_band, show_value
 from castblast.report.style import (
     BLUE,
@@ -15,6 +17,7 @@ from castblast.report.style import (
     PURPLE,
     RED,
     SKY,
+    finished,
     in_style,
     new_figure,
     save_figure,
@@ -56,16 +59,21 @@ _LEDGER = (
 )
 
 
-@in_style
 def draw_simulation(
     path: Path, document: Mapping[str, Any], near: NearFieldHistory, burden: BurdenHistory
 ) -> Path:
+    """Draw `simulation_figure` into a file (PNG or SVG)."""
+    return save_figure(simulation_figure(document, near, burden), path)
+
+
+@in_style
+def simulation_figure(
+    document: Mapping[str, Any], near: NearFieldHistory, burden: BurdenHistory
+) -> Figure:
     """Draw the four panels of one blast.
 
     Parameters
     ----------
-    path : path
-        Picture to write (PNG or SVG).
     document : mapping
         Outputs of the run in SI units, by the names of `castblast.design.variables`.
     near, burden
@@ -85,7 +93,7 @@ def draw_simulation(
         f"in brackets the prediction band, {BASIS}",
         fontsize=11,
     )
-    return save_figure(figure, path)
+    return finished(figure)
 
 
 def _draw_pressure(axis: Any, document: Mapping[str, Any], near: NearFieldHistory) -> None:

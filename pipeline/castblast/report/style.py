@@ -44,6 +44,23 @@ _STYLE: Any = {
 in_style = rc_context(_STYLE)
 
 
+class ShownFigure(Figure):
+    """A figure that a notebook shows by itself: IPython asks for `_repr_png_`."""
+
+    def _repr_png_(self) -> bytes:
+        return figure_png(self)
+
+
+def figure_png(figure: Figure, dpi: int = 100) -> bytes:
+    """Picture of a figure as the bytes of a PNG."""
+    from io import BytesIO
+
+    content = BytesIO()
+    with rc_context(_STYLE):
+        figure.savefig(content, dpi=dpi, format="png", metadata={"Software": None})
+    return content.getvalue()
+
+
 def new_figure(
     rows: int = 1, columns: int = 1, *, width: float = 9.0, height: float = 3.2, **options: Any
 ) -> tuple[Figure, Any]:
@@ -52,7 +69,7 @@ def new_figure(
     Returns the figure and an array of axes (a single axes object for one).
     """
     with rc_context(_STYLE):
-        figure = Figure(figsize=(width, height), layout="constrained")
+        figure = ShownFigure(figsize=(width, height), layout="constrained")
         axes = figure.subplots(rows, columns, **options)
     return figure, axes
 
@@ -60,11 +77,17 @@ def new_figure(
 def save_figure(figure: Figure, path: Path, *, dpi: int = 150) -> Path:
     """Write a PNG (or SVG, by suffix) whole or not at all, without a date in it."""
     metadata = {"Date": None} if path.suffix == ".svg" else {"Software": None}
+    finished(figure)
+    with rc_context(_STYLE):
+        return write_with(path, lambda name: figure.savefig(name, dpi=dpi, metadata=metadata))
+
+
+def finished(figure: Figure) -> Figure:
+    """Make a drawn figure ready to be saved or shown; gives the same figure back."""
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):
             _without_math(axis)
-    with rc_context(_STYLE):
-        return write_with(path, lambda name: figure.savefig(name, dpi=dpi, metadata=metadata))
+    return figure
 
 
 class _PlainPowers(LogFormatter):

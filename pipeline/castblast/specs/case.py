@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -89,13 +89,38 @@ def parse_values(
     faults = []
     for name, value in values.items():
         if name not in allowed:
-            hint = nearest_name(name, allowed)
-            faults.append(f"{where}: {shortened(name)}: no such input{hint}")
+            faults.append(unknown_input(name, value, where, allowed))
             continue
         try:
             parsed[name] = parse_variable(name, value, f"{where}: {name}")
         except SpecError as error:
-            faults.append(str(error))
-    if faults:
-        raise SpecError("\n".join(faults))
+            faults.append(error)
+    require_none(faults)
     return parsed
+
+
+def unknown_input(
+    name: object, value: object, where: str, allowed: tuple[str, ...] = INPUT_NAMES
+) -> SpecError:
+    """Fault of a name that is no input, with the nearest one."""
+    hint = nearest_name(str(name), allowed)
+    message = f"{where}: {shortened(name)}: no such input{hint}"
+    return SpecError(message, field=str(name), value=value, allowed=allowed)
+
+
+def require_none(faults: Sequence[SpecError]) -> None:
+    """Raise faults together, one a line, if there are any.
+
+    Raises
+    ------
+    SpecError
+        Field, value and what is allowed are those of the first.
+    """
+    if faults:
+        first = faults[0]
+        raise SpecError(
+            "\n".join(map(str, faults)),
+            field=first.field,
+            value=first.value,
+            allowed=first.allowed,
+        )

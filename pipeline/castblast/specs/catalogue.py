@@ -77,4 +77,4 @@ def find_explosive(name_or_path: str | Path) -> Path:
     hint = nearest_name(spelled(text), (*explosive_names(), *explosive_aliases()))
     asked = f"unknown explosive '{shortened(text)}'{hint or ';'}"
     message = f"{asked} known: {known}; or the path of a YAML file"
-    raise SpecError(message)
+    raise SpecError(message, field="explosive", value=text, allowed=explosive_names())

@@ -13,7 +13,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
-from castblast.errors import SpecError
+from castblast.errors import CheckError, SpecError
 from castblast.explosive.checks import check_jwl
 from castblast.explosive.cj import (
     CjState,
@@ -25,7 +25,7 @@ from castblast.explosive.cj import (
     jwl_constant_volume_pressure,
     touching_state,
 )
-from castblast.explosive.finding import Finding
+from castblast.explosive.finding import Finding, rejected, warned
 from castblast.explosive.isentrope import (
     Explosive,
     ProductIsentrope,
@@ -286,6 +286,24 @@ class ExplosiveSpec(Spec):
             f"{self.name}: no CJ state follows from these numbers; run 'castblast explosive check'"
         )
         raise SpecError(message)
+
+
+def require_consistent(spec: ExplosiveSpec, *, allow_inconsistent: bool = False) -> list[str]:
+    """Refuse an explosive whose numbers do not belong together; return remarks for people.
+
+    Raises
+    ------
+    CheckError
+        A relation failed; every failed one is named with its value.
+    """
+    findings = spec.check()
+    failed = rejected(findings)
+    if failed and not allow_inconsistent:
+        lines = [f"{spec.name}: inconsistent explosive: {finding}" for finding in failed]
+        lines += [f"{spec.name}: {line}" for line in spec.remedies()]
+        lines.append("mend the file, or run it as it is with --allow-inconsistent")
+        raise CheckError("\n".join(lines))
+    return [f"{spec.name}: {finding}" for finding in [*failed, *warned(findings)]]
 
 
 def load_explosive(name_or_path: str | Path) -> ExplosiveSpec:

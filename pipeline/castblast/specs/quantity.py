@@ -28,6 +28,7 @@ __all__ = [
     "QuantityIn",
     "VariableIn",
     "allowed",
+    "check_variable",
     "convert",
     "convert_variable",
     "parse_quantity",
@@ -58,9 +59,14 @@ def allowed(variable: Variable) -> str:
     return f"{low:.6g} to {variable.show(variable.upper)}"
 
 
-def _placed(fault: QuantityError, value: object, where: str) -> SpecError:
+def _placed(fault: QuantityError, value: object, where: str, name: str = "") -> SpecError:
     prefix = f"{where}: " if where else ""
-    return SpecError(f"{prefix}{shortened(value)}: {fault}")
+    return SpecError(
+        f"{prefix}{shortened(value)}: {fault}",
+        field=name or None,
+        value=value,
+        allowed=allowed(VARIABLES[name]) if name else None,
+    )
 
 
 def parse_quantity(value: object, unit: str, where: str = "") -> float:
@@ -87,11 +93,25 @@ def parse_variable(name: str, value: object, where: str = "") -> float:
     """
     if name not in VARIABLES:
         message = f"{where or name}: unknown variable '{name}'{nearest_name(name, VARIABLES)}"
-        raise SpecError(message)
+        raise SpecError(message, field=name, allowed=tuple(VARIABLES))
     try:
         return convert_variable(name, value)
     except QuantityError as fault:
-        raise _placed(fault, value, where or name) from None
+        raise _placed(fault, value, where or name, name) from None
+
+
+def check_variable(name: str, number: float, where: str = "") -> float:
+    """Hold a number in SI against the bounds of the variable `name`; give it back.
+
+    Raises
+    ------
+    SpecError
+        One line: where, value, what is allowed.
+    """
+    try:
+        return VariableIn(name).check(number)
+    except QuantityError as fault:
+        raise _placed(fault, number, where or name, name) from None
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from castblast.errors import CheckError
 from castblast.explosive.cj import volume_at_pressure, work_to_pressure
 from castblast.explosive.finding import Finding, rejected, warned
 from castblast.explosive.isentrope import energy, in_hole_velocity, pressure, slope
-from castblast.specs.catalogue import explosive_names
-from castblast.specs.explosive import ExplosiveSpec, load_explosive
+from castblast.specs.explosive import load_explosive
 from castblast.stages.outcome import Outcome
 
 #: Pressures [Pa] down to which the work of the products is shown.
@@ -18,25 +16,6 @@ WORK_PRESSURES = (1e8, 2e7, 1e5)
 SLOPE_VOLUMES = (1.0, 2.0, 3.3, 10.0)
 #: Hole diameter [m] at which the in-hole velocity is shown.
 SHOWN_DIAMETER = 0.15
-
-
-def catalogue() -> list[dict[str, Any]]:
-    """Short descriptions of the catalogue, in alphabetical order; SI units."""
-    entries = []
-    for name in explosive_names():
-        spec = load_explosive(name)
-        state = spec.cj_state()
-        entries.append(
-            {
-                "name": spec.name,
-                "density": spec.density,
-                "detonation_velocity": spec.detonation_velocity,
-                "heat_of_explosion": spec.heat_of_explosion,
-                "cj_pressure": None if state is None else state.pressure,
-                "explosion_pressure": pressure(spec.to_explosive().isentrope, 1.0),
-            }
-        )
-    return entries
 
 
 def describe(name_or_path: str) -> dict[str, Any]:
@@ -117,21 +96,3 @@ def check_explosive(name_or_path: str) -> Outcome:
             "remedies": mends,
         },
     )
-
-
-def require_consistent(spec: ExplosiveSpec, *, allow_inconsistent: bool = False) -> list[str]:
-    """Refuse an explosive whose numbers do not belong together; return remarks for people.
-
-    Raises
-    ------
-    CheckError
-        A relation failed; every failed one is named with its value.
-    """
-    findings = spec.check()
-    failed = rejected(findings)
-    if failed and not allow_inconsistent:
-        lines = [f"{spec.name}: inconsistent explosive: {finding}" for finding in failed]
-        lines += [f"{spec.name}: {line}" for line in spec.remedies()]
-        lines.append("mend the file, or run it as it is with --allow-inconsistent")
-        raise CheckError("\n".join(lines))
-    return [f"{spec.name}: {finding}" for finding in [*failed, *warned(findings)]]

@@ -8,15 +8,16 @@ from pathlib import Path
 import pytest
 import yaml
 
+from castblast.api.catalogue import catalogue
 from castblast.dataset.file.provenance import load_explosives
 from castblast.disk.resources import resource
 from castblast.errors import CheckError, SpecError
 from castblast.explosive.isentrope import energy, in_hole_velocity, pressure
 from castblast.prediction.answer import predict
 from castblast.specs.catalogue import explosive_names, resolve_explosive
-from castblast.specs.explosive import load_explosive
+from castblast.specs.explosive import load_explosive, require_consistent
 from castblast.specs.recipe import load_recipe
-from castblast.stages.explosives import catalogue, check_explosive, describe, require_consistent
+from castblast.stages.explosives import check_explosive, describe
 from castblast.stages.predict_table import predict_csv
 
 TNT = {

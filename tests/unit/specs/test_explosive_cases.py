@@ -10,9 +10,9 @@ import yaml
 from castblast.cli import main
 from castblast.errors import CheckError, SpecError
 from castblast.explosive.finding import rejected
-from castblast.specs.explosive import load_explosive
+from castblast.specs.explosive import load_explosive, require_consistent
 from castblast.specs.units import convert
-from castblast.stages.explosives import check_explosive, require_consistent
+from castblast.stages.explosives import check_explosive
 
 CASES = Path(__file__).parents[2] / "cases" / "explosives"
 UNITS = ("c1_tnt_cmgus", "c1b_tnt_gcc", "c1e_tnt_cal", "c11_mwpa")

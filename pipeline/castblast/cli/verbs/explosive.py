@@ -32,7 +32,7 @@ _Name = Annotated[str, typer.Argument(help="Name in the catalogue, or an explosi
 @verb(app, "list")
 def list_(screen: Screen) -> Mapping[str, Any]:
     """List the explosives that come with castblast."""
-    from castblast.stages.explosives import catalogue
+    from castblast.api.catalogue import catalogue
 
     entries = catalogue()
     screen.table(

@@ -17,7 +17,6 @@ from functools import cache
 from importlib.metadata import version
 from typing import Any, NamedTuple
 
-from castblast import __version__
 from castblast.dataset.file.schema import SCHEMA, SCHEMA_VERSION
 from castblast.design.variables import VARIABLES
 from castblast.disk.reading import parse_json
@@ -28,6 +27,7 @@ from castblast.specs.catalogue import find_explosive
 from castblast.specs.explosive import ExplosiveSpec
 from castblast.specs.loading import make_spec, parse_yaml, read_yaml_text
 from castblast.specs.recipe import DESCRIPTIVE_KEYS, EXECUTION_KEYS, Recipe, RecipeSource
+from castblast.version import __version__
 
 #: Sources that can change a number of a dataset.
 SOURCES = (

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from castblast import __version__
 from castblast.design.variables import VARIABLES
 from castblast.report.html import Picture, Section, Table, write_report
 from castblast.stages.training.train import show_r_squared, show_share
+from castblast.version import __version__
 
 Document = Mapping[str, Any]
 #: Broken rules named per model; the picture shows all.

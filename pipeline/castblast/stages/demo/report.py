@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from castblast import __version__
+from castblast.version import __version__
 from castblast.bands import BAND_SENTENCE, BAND_TITLE, show_band, show_value
 from castblast.report.html import Picture, Section, Table, write_report
 from castblast.stages.datasets.dataset import describe_dataset

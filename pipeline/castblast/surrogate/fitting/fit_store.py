@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 
-from castblast import __version__
 from castblast.errors import SpecError
 from castblast.kernel import source_hash
 from castblast.specs.models.model import CustomSpec, ModelSpec
@@ -26,6 +25,7 @@ from castblast.surrogate.fitting.families.custom import importable
 from castblast.surrogate.fitting.features import Table
 from castblast.surrogate.fitting.kept import keep, kept
 from castblast.surrogate.fitting.training import Fit
+from castblast.version import __version__
 
 #: Folders that turn a spec and rows into a fit: a change in one makes every fit stale.
 FIT_SOURCES = ("network", "specs/models", "surrogate/fitting")

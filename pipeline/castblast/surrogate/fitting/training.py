@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from castblast import __version__
 from castblast.errors import SpecError
 from castblast.network import Network, Shell
 from castblast.progress import ProgressCallback, silent
@@ -26,6 +25,7 @@ from castblast.surrogate.fitting.metrics import (
     summary_error,
 )
 from castblast.types import FloatArray
+from castblast.version import __version__
 
 
 class Restart(NamedTuple):

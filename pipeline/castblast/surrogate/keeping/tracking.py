@@ -15,11 +15,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from castblast import __version__
 from castblast.disk.plain import finite
 from castblast.surrogate.fitting.features import SPLITS
 from castblast.surrogate.fitting.training import Fit, LearningPoint
 from castblast.surrogate.keeping.logged_model import log_model
+from castblast.version import __version__
 
 if TYPE_CHECKING:
     from castblast.surrogate.searching.tuning import StudyResult

@@ -16,7 +16,6 @@ from itertools import count
 from pathlib import Path
 from typing import Any, Literal
 
-from castblast import __version__
 from castblast.errors import CastblastError, SpecError
 from castblast.extras import require
 from castblast.progress import ProgressCallback, silent
@@ -27,6 +26,7 @@ from castblast.surrogate.fitting.fit_store import table_hash
 from castblast.surrogate.fitting.training import fit_spec
 from castblast.surrogate.searching.study_file import hold_study
 from castblast.surrogate.searching.tuning_space import candidate, own_parameters, suggest
+from castblast.version import __version__
 
 State = Literal["complete", "pruned", "failed"]
 #: Errors this close to the lowest (ratio) count as equal; the smaller model is the better one.
