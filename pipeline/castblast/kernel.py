@@ -15,7 +15,6 @@ states of an explosive. What simulates asks for Numba before it begins (`castbla
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Callable
 from functools import cache
@@ -24,23 +23,12 @@ from typing import Any, ParamSpec, TypeVar, cast
 
 from castblast.caches import cache_folder
 from castblast.extras import is_installed
+from castblast.identity import source_hash
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 _PACKAGE = Path(__file__).resolve().parent
 _SOURCES = ("explosive", "kernel.py", "nearfield", "burden", "muckpile")
-
-
-@cache
-def source_hash(entries: tuple[str, ...] = _SOURCES) -> str:
-    """SHA-256 (hex) over sources of the package; by default all that hold kernels."""
-    digest = hashlib.sha256()
-    for entry in entries:
-        path = _PACKAGE / entry
-        for source in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
-            digest.update(source.relative_to(_PACKAGE).as_posix().encode())
-            digest.update(source.read_bytes())
-    return digest.hexdigest()
 
 
 @cache
@@ -51,7 +39,7 @@ def _has_numba() -> bool:
 @cache
 def _prepare_cache() -> str | None:
     """Name the cache folder before Numba is imported and return it; None: nothing is kept."""
-    folder = cache_folder("kernels", source_hash()[:16])
+    folder = cache_folder("kernels", source_hash(_SOURCES)[:16])
     if folder is None:
         os.environ.pop("NUMBA_CACHE_DIR", None)
         return None

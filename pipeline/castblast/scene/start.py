@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ import numpy as np
 from castblast.disk.files import write_with
 from castblast.disk.reading import read_npz
 from castblast.errors import SimulationError, SpecError, Status
-from castblast.kernel import source_hash
+from castblast.identity import digest, source_hash
 from castblast.muckpile.balls.particles import Particles, particles_at_rest
 from castblast.muckpile.bench.geometry import Bench, bench_outline
 from castblast.muckpile.bench.packing import count_of, fill_bench
@@ -141,14 +140,10 @@ def _packing_key(spec: BenchSpec, bench: Bench, sizes: Sizes) -> str:
     """Hash of all that a packing depends on, the code included; not of blocks and firing."""
     outline = bench_outline(bench)
     numbers = (outline.corner, outline.lean, sizes.radius, sizes.below)
-    digest = hashlib.sha256()
-    for array in numbers:
-        digest.update(np.ascontiguousarray(array, dtype="<f8").tobytes())
-        digest.update(b"/")
     parts = [repr(bench.height), repr(spec.balls.solid_fraction), spec.contact.sha256()]
     parts += [str(spec.seed), source_hash(CAST_SOURCES)]
-    digest.update(" ".join(parts).encode())
-    return digest.hexdigest()
+    contents = (np.asarray(array, dtype="<f8").tobytes() + b"/" for array in numbers)
+    return digest(*contents, " ".join(parts))
 
 
 def _read_packing(path: Path, key: str) -> Start | None:

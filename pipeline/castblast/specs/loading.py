@@ -6,8 +6,6 @@ is reported at once, as ``file: field: value: what is wrong, what is allowed``.
 
 from __future__ import annotations
 
-import hashlib
-import json
 import re
 import types
 import typing
@@ -21,6 +19,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 from castblast.disk.reading import nearest_file as nearest_file
 from castblast.disk.reading import read_text as read_text
 from castblast.errors import SpecError, nearest_name
+from castblast.identity import document_hash
 from castblast.names import check_label, check_name, shortened
 
 M = TypeVar("M", bound=BaseModel)
@@ -46,10 +45,8 @@ class Spec(BaseModel):
 
     def sha256(self) -> str:
         """SHA-256 (hex) of the content in SI units, whatever the layout of the file."""
-        content = json.dumps(
-            self.model_dump(mode="json"), sort_keys=True, separators=(",", ":"), allow_nan=False
-        )
-        return hashlib.sha256(content.encode()).hexdigest()
+        content = self.model_dump(mode="json")
+        return document_hash(content, separators=(",", ":"), allow_nan=False)
 
 
 #: Most bytes of a YAML file, and most values in it with every alias written out.

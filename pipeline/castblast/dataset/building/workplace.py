@@ -6,7 +6,6 @@ overwritten by another one unless that is asked for.
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -15,12 +14,11 @@ from typing import Any
 
 from castblast.dataset.file.provenance import differences
 from castblast.dataset.file.store import reading
-from castblast.disk.files import require_writable, write_text
+from castblast.disk.files import require_writable
 from castblast.disk.locks import only_writer
-from castblast.disk.reading import parse_json, read_json
+from castblast.disk.note import read_note, write_note
+from castblast.disk.reading import parse_json
 from castblast.errors import DatasetError, SpecError, StaleResultError
-
-_NOTE = "made_from.json"
 
 
 def work_folder(path: Path) -> Path:
@@ -88,27 +86,18 @@ def open_work_folder(path: Path, origin: Mapping[str, Any], *, restart: bool) ->
     if restart and folder.exists():
         shutil.rmtree(folder)
     require_writable(folder)
-    old = _read_note(folder / _NOTE)
+    old = read_note(folder)
     if old and old != origin:
         raise StaleResultError(_stale(folder, old, origin))
     for left_over in folder.glob(".*.tmp.*"):  # of a process that was killed while it wrote
         left_over.unlink(missing_ok=True)
-    write_text(folder / _NOTE, json.dumps(dict(origin), indent=1, sort_keys=True) + "\n")
+    write_note(folder, origin)
     return folder
 
 
 def close_work_folder(path: Path) -> None:
     """Remove the shards of a finished dataset."""
     shutil.rmtree(work_folder(path))
-
-
-def _read_note(path: Path) -> dict[str, Any]:
-    """Read what the shards were made from; empty if that cannot be read (shards tell as well)."""
-    try:
-        content = read_json(path)
-    except SpecError:
-        return {}
-    return content if isinstance(content, dict) else {}
 
 
 def _stale(place: Path, old: Mapping[str, Any], new: Mapping[str, Any]) -> str:

@@ -8,20 +8,17 @@ equal inputs give equal bytes; ACDD's `date_created` is left out for that reason
 
 from __future__ import annotations
 
-import hashlib
 import json
 import platform
 import re
 from collections.abc import Iterator, Mapping
-from functools import cache
-from importlib.metadata import version
 from typing import Any, NamedTuple
 
 from castblast.dataset.file.schema import SCHEMA, SCHEMA_VERSION
 from castblast.design.variables import VARIABLES
 from castblast.disk.reading import parse_json
 from castblast.errors import DatasetError, SpecError
-from castblast.kernel import source_hash
+from castblast.identity import document_hash, library_version, source_hash
 from castblast.names import printable
 from castblast.specs.catalogue import find_explosive
 from castblast.specs.explosive import ExplosiveSpec
@@ -133,14 +130,14 @@ def made_from(
         "code": {"castblast": __version__, "source_sha256": source_hash(SOURCES)},
         "libraries": {
             "python": ".".join(platform.python_version_tuple()[:2]),
-            **{name: _version(name) for name in _LIBRARIES},
+            **{name: library_version(name) for name in _LIBRARIES},
         },
     }
 
 
 def rows_hash(origin: Mapping[str, Any]) -> str:
     """SHA-256 (hex) of a `made_from`."""
-    return hashlib.sha256(json.dumps(origin, sort_keys=True).encode()).hexdigest()
+    return document_hash(origin)
 
 
 def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
@@ -214,7 +211,7 @@ def global_attributes(
         "source_sha256": origin["code"]["source_sha256"],
         "castblast_version": __version__,
         "dependency_versions": json.dumps(
-            {**origin["libraries"], **{name: _version(name) for name in _CONTAINERS}}
+            {**origin["libraries"], **{name: library_version(name) for name in _CONTAINERS}}
         ),
         "design_method": method,
         "design_seed": str(recipe.seed),
@@ -223,11 +220,6 @@ def global_attributes(
         "n_failed": n_failed,
         **({"extends": json.dumps(extends)} if extends else {}),
     }
-
-
-@cache
-def _version(name: str) -> str:
-    return version(name)
 
 
 def _leaves(tree: Mapping[str, Any], place: str = "") -> Iterator[tuple[str, Any]]:

@@ -12,9 +12,9 @@ would no longer be a sample of the domain, and scores before and after could not
 from __future__ import annotations
 
 import csv
-import hashlib
 import io
 from collections.abc import Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,7 @@ from castblast.dataset.rows.design import Design, row_faults
 from castblast.dataset.rows.simulation import Columns, Simulator
 from castblast.disk.files import write_text
 from castblast.errors import SpecError, nearest_name
+from castblast.identity import digest
 from castblast.names import cell_text
 from castblast.specs.catalogue import resolve_explosive
 from castblast.specs.recipe import SPLIT_NAMES, Recipe, VariableSpec
@@ -175,9 +176,6 @@ def design_of_rows(
 
 def rows_sha256(columns: Columns, explosive: NDArray[np.int8]) -> str:
     """SHA-256 (hex) of chosen rows: part of what a dataset was made from."""
-    digest = hashlib.sha256()
-    for name in sorted(columns):
-        digest.update(name.encode())
-        digest.update(np.ascontiguousarray(columns[name], dtype="<f8").tobytes())
-    digest.update(np.ascontiguousarray(explosive, dtype=np.int8).tobytes())
-    return digest.hexdigest()
+    values = {name: np.asarray(columns[name], dtype="<f8").tobytes() for name in sorted(columns)}
+    kinds = np.asarray(explosive, dtype=np.int8).tobytes()
+    return digest(*chain.from_iterable(values.items()), kinds)

@@ -6,7 +6,6 @@ another case is refused. Threads and the interval of pictures are no part of it.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 from time import perf_counter
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 from castblast.disk.files import write_with
 from castblast.disk.reading import read_npz
 from castblast.errors import OutputError, SpecError
-from castblast.kernel import source_hash
+from castblast.identity import digest, source_hash
 from castblast.muckpile.cast.case import CastCase
 
 #: What may differ between the interrupted and the continued run.
@@ -116,16 +115,12 @@ CAST_SOURCES = (
 
 def case_hash(case: CastCase) -> str:
     """SHA-256 (hex) of a case and of the code that runs it."""
-    digest = hashlib.sha256(source_hash(CAST_SOURCES).encode())
+    parts: list[Any] = [source_hash(CAST_SOURCES)]
     for name, value in case._asdict().items():
-        if name in _FREE:
-            continue
-        digest.update(name.encode())
-        for part in value if isinstance(value, tuple) else (value,):
-            array = np.ascontiguousarray(part)
-            digest.update(f"{array.dtype.str} {array.shape}".encode())
-            digest.update(array.tobytes())
-    return digest.hexdigest()
+        if name not in _FREE:
+            parts.append(name)
+            parts += map(np.asarray, value if isinstance(value, tuple) else (value,))
+    return digest(*parts)
 
 
 def write_restart(path: Path, key: str, arrays: Arrays) -> None:

@@ -12,7 +12,6 @@ search:
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from typing import Any, Self, TypeAlias
@@ -20,6 +19,7 @@ from typing import Any, Self, TypeAlias
 from pydantic import ConfigDict, Field, RootModel, ValidationError, field_validator, model_validator
 
 from castblast.errors import nearest_name
+from castblast.identity import document_hash
 from castblast.specs.loading import Spec
 
 #: Fields that make another question of a spec, not another answer.
@@ -129,8 +129,7 @@ class SearchSpace(RootModel[dict[str, Range]]):
 
     def sha256(self) -> str:
         """SHA-256 (hex) of the space, whatever the order of its fields."""
-        content = json.dumps(self.model_dump(mode="json"), sort_keys=True)
-        return hashlib.sha256(content.encode()).hexdigest()
+        return document_hash(self.model_dump(mode="json"))
 
 
 def _read_range(value: Any) -> Spec:

@@ -6,8 +6,6 @@ are missing run some at a time, each in a process of its own.
 
 from __future__ import annotations
 
-import hashlib
-import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,9 +13,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from castblast.identity import document_hash, package_hash
 from castblast.jobs import Job, run_jobs
 from castblast.progress import ProgressCallback, silent
-from castblast.stages.reuse import package_hash
 
 if TYPE_CHECKING:
     from castblast.specs.models.model import ModelSpec
@@ -52,8 +50,7 @@ class Part:
     @property
     def key(self) -> dict[str, str]:
         """What the result was made from, hashed."""
-        text = json.dumps(dict(self.inputs), sort_keys=True, default=str)
-        inputs = hashlib.sha256(text.encode()).hexdigest()
+        inputs = document_hash(self.inputs, default=str)
         return {"inputs": inputs, "package": package_hash(_NO_PART)}
 
 

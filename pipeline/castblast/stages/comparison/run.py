@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from castblast.disk.resources import resource
 from castblast.errors import DatasetError, SpecError
+from castblast.identity import file_hash
 from castblast.progress import ProgressCallback, part, silent
 from castblast.stages.comparison.found import Comparison, Extent
 from castblast.stages.comparison.parts import (
@@ -28,7 +29,6 @@ from castblast.stages.comparison.parts import (
     sobol_part,
 )
 from castblast.stages.outcome import Outcome
-from castblast.stages.reuse import file_hash
 from castblast.stages.training.fitting import (
     fit_all,
     fit_files,

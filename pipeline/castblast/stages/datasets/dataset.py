@@ -18,7 +18,7 @@ from castblast.dataset.file.store import reading_dataset
 from castblast.dataset.rows.simulation import blast_simulator
 from castblast.design.variables import INPUT_NAMES, OUTPUT_NAMES, VARIABLES
 from castblast.errors import DatasetError, SpecError, Status
-from castblast.kernel import source_hash
+from castblast.identity import source_hash
 from castblast.names import printable
 from castblast.progress import ProgressCallback, silent
 from castblast.specs.recipe import recipe_from_text

@@ -13,11 +13,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from castblast.identity import make_key
 from castblast.errors import SpecError, StaleResultError
 from castblast.extras import is_installed
 from castblast.progress import ProgressCallback
 from castblast.disk.resources import resource
-from castblast.stages.reuse import is_valid, make_key, mark_valid
+from castblast.disk.note import read_note, write_note
 
 RECIPE = "data_specs/recipes/quickstart.yaml"
 BENCH = "data_specs/benches/demo.yaml"
@@ -95,7 +96,7 @@ def _train(demo: Demo, progress: ProgressCallback) -> list[str]:
     folder = demo.out / "models"
     specs = [resource(f"models/specs/{name}.yaml") for name in MODELS]
     key = make_key(dataset=demo.dataset, **{spec.stem: spec for spec in specs})
-    if not demo.restart and is_valid(folder, key):
+    if not demo.restart and read_note(folder) == key:
         return [f"{folder}: still valid, reused"]
     outcome = compare(
         demo.dataset,
@@ -108,7 +109,7 @@ def _train(demo: Demo, progress: ProgressCallback) -> list[str]:
         runs=demo.out / "runs",
         progress=progress,
     )
-    mark_valid(folder, key)
+    write_note(folder, key)
     return [_league_line(row) for row in outcome.rows] + outcome.lines
 
 
@@ -133,10 +134,10 @@ def _predict(demo: Demo, progress: ProgressCallback) -> list[str]:
 
     folder = demo.out / "prediction"
     key = make_key(network=demo.network)
-    if not demo.restart and is_valid(folder, key):
+    if not demo.restart and read_note(folder) == key:
         return [f"{folder}: still valid, reused"]
     lines = compare_with_physics(demo.network, folder, progress)
-    mark_valid(folder, key)
+    write_note(folder, key)
     return lines
 
 
@@ -149,13 +150,13 @@ def _throw(demo: Demo, progress: ProgressCallback) -> list[str]:
     velocity = f"{answers['predicted']['burden_velocity']:.6g} m/s"
     named = {name: demo.bench.parent / name for name in load_bench(demo.bench).files()}
     key = make_key(bench=demo.bench, velocity=velocity, **named)
-    if not demo.restart and is_valid(folder, key):
+    if not demo.restart and read_note(folder) == key:
         return [f"{folder}: still valid, reused"]
     outcome = run_muckpile(
         demo.bench, folder, velocity=velocity, threads=demo.workers, progress=progress
     )
     if not outcome.faults:
-        mark_valid(folder, key)
+        write_note(folder, key)
     lines = [f"{name}: {value} {unit}" for name, value, unit in outcome.rows[:6]]
     return lines + [f"not ok: {fault}" for fault in outcome.faults]
 

@@ -12,8 +12,10 @@ import numpy as np
 
 from castblast.disk.files import require_writable, tried, write_json, written_together
 from castblast.disk.locks import LOCK_NAME, only_writer
+from castblast.disk.note import forget_note, read_note, write_note
 from castblast.disk.plain import as_plain
 from castblast.errors import SpecError
+from castblast.identity import make_key
 from castblast.muckpile.results.metrics import UNITS, Band, band
 from castblast.muckpile.results.profile import Profile
 from castblast.progress import ProgressCallback, silent
@@ -21,7 +23,6 @@ from castblast.specs.bench.bench import BenchSpec
 from castblast.stages.muckpile.read import FinishedRun, numbers, read_runs
 from castblast.stages.muckpile.results import HEADER, bench_content
 from castblast.stages.outcome import Outcome
-from castblast.stages.reuse import forget, is_valid, make_key, mark_valid
 
 _PER_BLOCK = ("block_throw", "block_spread")
 
@@ -135,14 +136,14 @@ def run_seeds(
             def report(share: float, line: str, k: int = k) -> None:
                 progress((k + share) / seeds, f"seed {first + k}: {line}")
 
-            if not is_valid(each, key):
-                forget(each)
+            if read_note(each) != key:
+                forget_note(each)
                 run = run_muckpile(bench, each, seed=first + k, progress=report, **options)
                 files, remarks = files + run.files, run.remarks
-                mark_valid(each, key)
+                write_note(each, key)
         compared = compare_runs(folders, folder)
         for each in folders:
-            forget(each)
+            forget_note(each)
     return replace(compared, files=files + compared.files, remarks=remarks)
 
 

@@ -13,6 +13,7 @@ from castblast.disk.locks import LOCK_NAME, only_writer
 from castblast.disk.plain import as_plain
 from castblast.disk.resources import find_spec
 from castblast.errors import SpecError
+from castblast.identity import file_hash
 from castblast.muckpile.balls.particles import Particles
 from castblast.muckpile.bench.geometry import Bench
 from castblast.muckpile.cast.case import CastCase
@@ -43,7 +44,6 @@ from castblast.stages.muckpile.tables import (
 )
 from castblast.stages.muckpile.velocity import describe_velocity, velocity_remarks
 from castblast.stages.outcome import Outcome
-from castblast.stages.reuse import file_hash
 
 #: Where decks of castblast keep the balls before firing, beside the final state.
 _START_OF_DECK = "balls.data"

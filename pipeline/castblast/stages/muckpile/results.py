@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 from castblast.disk.files import write_csv, write_json, write_with
 from castblast.disk.plain import as_plain, finite
 from castblast.errors import Status
+from castblast.identity import digest, file_hash
 from castblast.muckpile.cast.solver import CastCase, CastResult
 from castblast.muckpile.results.metrics import UNITS, PileMetrics
 from castblast.muckpile.results.profile import mean_profile
@@ -31,7 +31,6 @@ from castblast.stages.muckpile.tables import (
 from castblast.stages.muckpile.velocity import describe_velocity, velocity_remarks, velocity_words
 from castblast.stages.muckpile.verdict import cast_faults
 from castblast.stages.outcome import Outcome
-from castblast.stages.reuse import file_hash
 
 #: Files that some runs write and others do not: they never stay beside those of another run.
 OPTIONAL_FILES = (
@@ -119,10 +118,8 @@ def describe_run(
 def bench_content(spec: BenchSpec, beside: Path) -> dict[str, Any]:
     """Hash of all that a bench file says, the content of the files that it names included."""
     named = {name: file_hash(beside / name) for name in spec.files()}
-    digest = hashlib.sha256(spec.sha256().encode())
-    for name, content in named.items():
-        digest.update(f" {name} {content}".encode())
-    return {"bench_sha256": digest.hexdigest(), "bench_files": named}
+    contents = (f" {name} {content}" for name, content in named.items())
+    return {"bench_sha256": digest(spec.sha256(), *contents), "bench_files": named}
 
 
 def metric_rows(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:

@@ -7,11 +7,9 @@ or in a folder of fits. What travels are ``fit.json`` and ``network.json``.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import pickle
 from collections.abc import Mapping
-from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -19,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from castblast.errors import SpecError
-from castblast.kernel import source_hash
+from castblast.identity import digest, file_hash, library_version, source_hash
 from castblast.specs.models.model import CustomSpec, ModelSpec
 from castblast.surrogate.fitting.families.custom import importable
 from castblast.surrogate.fitting.features import Table
@@ -34,16 +32,14 @@ _LIBRARIES = ("numpy", "scikit-learn", "torch")
 
 def table_hash(table: Table) -> str:
     """SHA-256 (hex) of the rows as a fit sees them: values, explosives, split, descriptors."""
-    digest = hashlib.sha256()
-    for name in table.feature_names:
-        digest.update(name.encode())
-        digest.update(table.frame[name].to_numpy(dtype=np.float64).tobytes())
-    digest.update(" ".join(table.target_names).encode())
-    digest.update(np.asarray(table.targets, dtype=np.float64).tobytes())
-    for labels in (table.frame["explosive"], table.split):
-        digest.update("\n".join(map(str, labels)).encode())
-    digest.update(json.dumps(table.descriptors, sort_keys=True).encode())
-    return digest.hexdigest()
+    values = ((name, table.frame[name].to_numpy(dtype=np.float64)) for name in table.feature_names)
+    return digest(
+        *(part for name, column in values for part in (name, column.tobytes())),
+        " ".join(table.target_names),
+        np.asarray(table.targets, dtype=np.float64).tobytes(),
+        *("\n".join(map(str, labels)) for labels in (table.frame["explosive"], table.split)),
+        json.dumps(table.descriptors, sort_keys=True),
+    )
 
 
 def fit_key(spec: ModelSpec, table: Table) -> dict[str, str]:
@@ -65,7 +61,7 @@ def _code_key(spec: ModelSpec) -> dict[str, str]:
         "castblast": __version__,
         "code": source_hash(FIT_SOURCES),
         "factory": _factory_hash(spec),
-        **{library: _version(library) for library in _LIBRARIES},
+        **{library: library_version(library) for library in _LIBRARIES},
     }
 
 
@@ -80,14 +76,7 @@ def _factory_hash(spec: ModelSpec) -> str:
             return ""
     if found is None or not found.origin or not Path(found.origin).is_file():
         return ""
-    return hashlib.sha256(Path(found.origin).read_bytes()).hexdigest()
-
-
-def _version(library: str) -> str:
-    try:
-        return version(library)
-    except PackageNotFoundError:
-        return ""
+    return file_hash(Path(found.origin))
 
 
 def save_kept(place: Path, value: Any, key: Mapping[str, str], spec: Any = None) -> bool:
