@@ -55,6 +55,20 @@ def check_label(text: str) -> str:
     return text
 
 
+def each_once(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return names as they are; a ValueError says which are given twice."""
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        message = f"given twice: {', '.join(twice)}"
+        raise ValueError(message)
+    return names
+
+
+def as_words(name: str) -> str:
+    """Name of a variable as words."""
+    return name.replace("_", " ")
+
+
 def is_label(text: object) -> bool:
     """Say whether a text is a label in ASCII, the form in which it can leave for other programs."""
     return isinstance(text, str) and text.isascii() and _LABEL.fullmatch(text) is not None

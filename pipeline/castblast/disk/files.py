@@ -101,8 +101,8 @@ def tried(folder: Path) -> Iterator[None]:
         As `require_writable`.
     """
     is_new = not folder.exists()
-    require_writable(folder)
     try:
+        require_writable(folder)
         yield
     finally:
         if is_new:
@@ -201,9 +201,14 @@ def publish(scratch: Path, folder: Path, replaces: Collection[str] = ()) -> None
         stop.obey(f"stopped; the results in {folder} are complete")
 
 
+def write_bytes(path: Path, content: bytes) -> Path:
+    """Write a file as it is."""
+    return write_with(path, lambda name: name.write_bytes(content))
+
+
 def write_text(path: Path, text: str) -> Path:
     """Write UTF-8 text with Unix line ends."""
-    return write_with(path, lambda name: name.write_bytes(text.encode()))
+    return write_bytes(path, text.encode())
 
 
 def write_json(path: Path, document: Any) -> Path:

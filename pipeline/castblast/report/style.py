@@ -14,6 +14,7 @@ from matplotlib.ticker import LogFormatter, LogFormatterMathtext
 
 from castblast.design.variables import VARIABLES
 from castblast.disk.files import write_with
+from castblast.names import as_words
 
 #: Colours that stay apart for colour-blind readers (Okabe & Ito 2008).
 BLUE, ORANGE, GREEN, RED, PURPLE, SKY, YELLOW, GREY = (
@@ -105,15 +106,10 @@ def _without_math(axis: Any) -> None:
         axis.set_minor_formatter(_PlainPowers())
 
 
-def words(name: str) -> str:
-    """Name of a variable as words."""
-    return name.replace("_", " ")
-
-
 def with_unit(name: str) -> str:
     """Name of a variable as words, with the unit for people unless it has none."""
     unit = VARIABLES[name].shown_unit
-    return words(name) if unit == "1" else f"{words(name)} [{unit}]"
+    return as_words(name) if unit == "1" else f"{as_words(name)} [{unit}]"
 
 
 def plain_log_ticks(axis: Any) -> None:

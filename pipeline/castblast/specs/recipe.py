@@ -19,6 +19,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from castblast.design.variables import INPUTS, VARIABLES, Variable
 from castblast.disk.resources import find_spec
 from castblast.errors import nearest_name
+from castblast.names import each_once
 from castblast.specs.case import ModeName, TensionName
 from castblast.specs.loading import Name, Spec, make_spec, parse_yaml, read_yaml_text
 from castblast.specs.quantity import QuantityIn, convert, convert_variable
@@ -291,11 +292,7 @@ class Recipe(Spec):
     @field_validator("explosives")
     @classmethod
     def _each_once(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        twice = sorted({name for name in names if names.count(name) > 1})
-        if twice:
-            message = f"given twice: {', '.join(twice)}"
-            raise ValueError(message)
-        return names
+        return each_once(names)
 
     @field_validator("variables", mode="before")
     @classmethod

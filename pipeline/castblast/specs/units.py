@@ -1,64 +1,64 @@
 """A number and a unit as people write them, turned into an SI float.
 
-Pint does the unit algebra over a small unit set of our own: it loads in a hundredth of a second,
-and the angle is a dimension of its own in it, so that ``0.3 rad`` is no Poisson's ratio.
+A unit is a product of powers of the symbols below, worked out in exact fractions, so that a factor
+is the nearest float. The angle is a dimension of its own: ``0.3 rad`` is no Poisson's ratio.
 """
 
 from __future__ import annotations
 
 import math
 import re
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from fractions import Fraction
 from functools import cache
-from typing import Any, TypeVar
+from typing import NamedTuple, NoReturn, TypeVar
 
 from castblast.errors import nearest_name
 from castblast.names import shortened
 from castblast.types import FloatArray
 
-_PREFIXES = (
-    "nano- = 1e-9 = n-",
-    "micro- = 1e-6 = u- = µ- = μ-",
-    "milli- = 1e-3 = m-",
-    "centi- = 1e-2 = c-",
-    "kilo- = 1e3 = k-",
-    "mega- = 1e6 = M-",
-    "giga- = 1e9 = G-",
-)
-_UNITS = (
-    "meter = [length] = m = metre",
-    "second = [time] = s",
-    "gram = [mass] = g",
-    "radian = [angle] = rad",
-    "degree = 0.017453292519943295 * radian = deg = °",
-    "percent = 0.01 = percent",
-    "minute = 60 * second = min",
-    "hour = 3600 * second = h",
-    "liter = 1e-3 * meter ** 3 = L = l = litre",
-    "cubic_centimeter = 1e-6 * meter ** 3 = cc",
-    "tonne = 1e6 * gram = t",
-    "newton = 1000 * gram * meter / second ** 2 = N",
-    "pascal = newton / meter ** 2 = Pa",
-    "bar = 1e5 * pascal = bar",
-    "joule = newton * meter = J",
-    "watt = joule / second = W",
-    "calorie = 4.184 * joule = cal",
-    "inch = 0.0254 * meter = in",
-    "foot = 0.3048 * meter = ft",
-    "pound = 453.59237 * gram = lb",
-    "psi = 6894.757293168361 * pascal = psi",
-    "ksi = 6894757.293168361 * pascal = ksi",
-    "atmosphere = 101325 * pascal = atm",
-    "yard = 0.9144 * meter = yd",
-    "ounce = 28.349523125 * gram = oz",
-    "gallon = 3.785411784e-3 * meter ** 3 = gal",
-    "pound_force = 4.4482216152605 * newton = lbf",
-    "kilogram_force = 9.80665 * newton = kgf",
-    "erg = 1e-7 * joule = erg",
-    "btu = 1055.05585262 * joule = Btu = BTU",
-)
+_BASE = ("m", "s", "kg", "rad")
+_PREFIXES = {
+    "nano n": "1e-9",
+    "micro u µ μ": "1e-6",
+    "milli m": "1e-3",
+    "centi c": "1e-2",
+    "kilo k": "1e3",
+    "mega M": "1e6",
+    "giga G": "1e9",
+}
+#: Names of a unit: how much it is of a unit that was defined before.
+_UNITS = {
+    "meter metre": ("1", "m"),
+    "second": ("1", "s"),
+    "gram g": ("1e-3", "kg"),
+    "radian": ("1", "rad"),
+    "degree deg °": ("0.017453292519943295", "rad"),
+    "percent": ("0.01", "1"),
+    "minute min": ("60", "s"),
+    "hour h": ("3600", "s"),
+    "liter litre L l": ("1e-3", "m3"),
+    "cc": ("1e-6", "m3"),
+    "tonne t": ("1e3", "kg"),
+    "newton N": ("1", "kg m s-2"),
+    "pascal Pa": ("1", "N m-2"),
+    "bar": ("1e5", "Pa"),
+    "joule J": ("1", "N m"),
+    "watt W": ("1", "J s-1"),
+    "calorie cal": ("4.184", "J"),
+    "inch in": ("0.0254", "m"),
+    "foot ft": ("0.3048", "m"),
+    "pound lb": ("0.45359237", "kg"),
+    "psi": ("6894.757293168361", "Pa"),
+    "ksi": ("6894757.293168361", "Pa"),
+    "atmosphere atm": ("101325", "Pa"),
+    "yard yd": ("0.9144", "m"),
+    "ounce oz": ("0.028349523125", "kg"),
+    "gallon gal": ("3.785411784e-3", "m3"),
+    "lbf": ("4.4482216152605", "N"),
+    "kgf": ("9.80665", "N"),
+    "erg": ("1e-7", "J"),
+    "btu Btu BTU": ("1055.05585262", "J"),
+}
 #: Unit symbols offered when a unit is not known.
 UNIT_SYMBOLS = (
     "m", "mm", "cm", "km", "um", "in", "ft", "s", "ms", "us", "min", "h", "kg", "g", "t", "lb",
@@ -97,15 +97,11 @@ _EXAMPLES = {
 _NUMBER = re.compile(
     r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?![\d.,])\s*(.*?)\s*", re.DOTALL
 )
-_POWER = re.compile(r"([A-Za-zµμ°]+)(?:\^|\*\*)?([+-]?\d+)")
-_SYMBOL = re.compile(r"[A-Za-zµμ°]+")
-#: A unit as a product of powers. What is left of it without its powers is one of a few signs:
-#: no power of a power, and no number, so that nobody can ask for 9^9^9.
-_FACTOR = re.compile(
-    r"(?:[A-Za-zµμ°]+(?:(?:\^|\*\*)?[+-]?[0-9]{1,2}(?![0-9]))?|\)(?:\^|\*\*)[+-]?[0-9](?![0-9])"
-    r"|(?<![0-9])1\s*/)"
+#: One part of a unit: a symbol or a closing bracket with its power, or a sign.
+_PART = re.compile(
+    r"\s*(?:(?P<symbol>[A-Za-zµμ°]+)(?:(?:\^|\*\*)?(?P<power>[+-]?[0-9]{1,2}(?![0-9])))?"
+    r"|\)(?:(?:\^|\*\*)(?P<outer>[+-]?[0-9](?![0-9])))?|(?P<sign>[(/]|\*(?!\*)|1(?=\s*/)))\s*"
 )
-_SIGNS = re.compile(r"(?:[()/\s]|\*(?!\*))*")
 #: Longest text of a value, and of its unit.
 _LONGEST, _LONGEST_UNIT = 200, 60
 
@@ -114,82 +110,136 @@ class QuantityError(ValueError):
     """What is wrong with one value; a plain ValueError, so that pydantic collects it."""
 
 
-@contextmanager
-def _hidden(*names: str) -> Iterator[None]:
-    """Make optional packages that are not loaded yet look absent to what is imported inside."""
-    absent = [name for name in names if name not in sys.modules]
-    sys.modules.update(dict.fromkeys(absent))  # type: ignore[arg-type]  # None: import refused
-    try:
-        yield
-    finally:
-        for name in absent:
-            del sys.modules[name]
+class _Unit(NamedTuple):
+    """A unit in SI: its size, and its powers of `_BASE`."""
+
+    size: Fraction
+    powers: tuple[int, ...] = (0, 0, 0, 0)
+
+    def times(self, other: _Unit, power: int = 1) -> _Unit:
+        """Product with a power of another unit."""
+        powers = (a + power * b for a, b in zip(self.powers, other.powers, strict=True))
+        return _Unit(self.size * other.size**power, tuple(powers))
+
+
+_ONE = _Unit(Fraction(1))
+
+
+class _UnknownSymbolError(Exception):
+    """A symbol that no unit has."""
 
 
 @cache
-def _registry() -> Any:
-    """Unit registry over the units above, made at the first use."""
-    # Pint imports dask and scipy where it finds them, for quantities in arrays, which are not used
-    # here: two thirds of the start-up time of `castblast predict` would go into that.
-    with _hidden("dask", "scipy"):
-        import pint
+def _symbols() -> dict[str, _Unit]:
+    """Every symbol that is a unit without a prefix."""
+    found = {
+        name: _Unit(Fraction(1), tuple(int(k == i) for k in range(len(_BASE))))
+        for i, name in enumerate(_BASE)
+    }
+    for names, (size, unit) in _UNITS.items():
+        defined = _ONE if unit == "1" else _parse(unit, found)
+        found |= {n: defined._replace(size=defined.size * Fraction(size)) for n in names.split()}
+    return found
 
-    registry = pint.UnitRegistry(None, on_redefinition="ignore")
-    for line in (*_PREFIXES, *_UNITS):
-        registry.define(line)
-    return registry
+
+@cache
+def _prefixes() -> dict[str, Fraction]:
+    """Size of every prefix; none comes first."""
+    written = {name: size for names, size in _PREFIXES.items() for name in names.split()}
+    return {"": Fraction(1)} | {name: Fraction(size) for name, size in written.items()}
+
+
+def _unit_of(symbol: str, known: dict[str, _Unit]) -> _Unit:
+    """Unit of a symbol: with a prefix, and in the plural (``lbs``) where it has two letters."""
+    for name in (symbol, symbol.removesuffix("s")):
+        shortest = 1 if name == symbol else 2
+        for prefix, size in _prefixes().items():
+            base = name.removeprefix(prefix) if name.startswith(prefix) else ""
+            if len(base) >= shortest and base in known and not (prefix and base == "kg"):
+                return _Unit(size).times(known[base])
+    raise _UnknownSymbolError(symbol)
+
+
+def _parse(text: str, known: dict[str, _Unit]) -> _Unit:
+    """Work out a product of powers, such as ``kg m-3``, ``kg/m3``, ``J/(kg*m^2)`` or ``1/s``.
+
+    Raises
+    ------
+    ValueError
+        Not of that form.
+    _UnknownSymbolError
+        With the first symbol that is no unit.
+    """
+    outer: list[tuple[_Unit, int]] = []
+    product, power, needed = _ONE, 1, True
+    place = 0
+    while place < len(text):
+        part = _PART.match(text, place)
+        if part is None:
+            raise ValueError
+        place, sign = part.end(), part["sign"]
+        if part["symbol"] or sign == "1":
+            unit = _unit_of(part["symbol"], known) if part["symbol"] else _ONE
+            product = product.times(unit, power * int(part["power"] or 1))
+            power, needed = 1, False
+        elif sign == "(":
+            outer.append((product, power))
+            product, power, needed = _ONE, 1, True
+        elif needed or (sign is None and not outer):
+            raise ValueError
+        elif sign is None:
+            before, outside = outer.pop()
+            product = before.times(product, outside * int(part["outer"] or 1))
+        else:
+            power, needed = (-1 if sign == "/" else 1), True
+    if needed or outer:
+        raise ValueError
+    return product
+
+
+def _to_unit(text: str) -> _Unit:
+    """Unit of a text in UDUNITS or everyday spelling: ``kg m-3``, ``kg/m³``."""
+    for written, plain in (("%", "percent"), ("·", " "), ("³", "3"), ("²", "2")):
+        text = text.replace(written, plain)
+    if text.strip() in ("", "1"):
+        return _ONE
+    if len(text) > _LONGEST_UNIT:
+        raise ValueError
+    return _parse(text, _symbols())
 
 
 @cache
 def _factor(written: str, unit: str) -> float:
     """Factor from the `written` unit to the SI `unit`."""
-    registry = _registry()  # before pint is imported anywhere else, see there
-    import pint
-
     try:
-        source = registry.parse_units(_to_expression(written))
-    except pint.UndefinedUnitError as fault:
-        names = fault.args[0] if fault.args else written
-        name = names if isinstance(names, str) else next(iter(names), written)
-        hint = nearest_name(name, UNIT_SYMBOLS) or f"; {needs(unit)}"
-        message = f"unknown unit '{name}'{hint}"
+        source = _to_unit(written)
+    except _UnknownSymbolError as fault:
+        hint = nearest_name(str(fault), UNIT_SYMBOLS) or f"; {needs(unit)}"
+        message = f"unknown unit '{fault}'{hint}"
         raise QuantityError(message) from None
-    except Exception:  # pint leaks tokenizer, syntax and attribute errors on odd text
-        message = f"'{shortened(written)}' is not a unit; {needs(unit)}"
-        raise QuantityError(message) from None
-    target = registry.parse_units(_to_expression(unit))
-    if source.dimensionality != target.dimensionality:
+    except ValueError:
+        _refuse(written, unit)
+    target = _to_unit(unit)
+    if source.powers != target.powers:
         message = f"'{shortened(written)}' is {_dimension_name(source)}; {needs(unit)}"
         raise QuantityError(message)
     try:
-        factor = float(registry.convert(1.0, source, target))
-    except (ArithmeticError, ValueError):
-        factor = math.nan
+        factor = float(source.size / target.size)
+    except OverflowError:
+        factor = math.inf
     if not 0.0 < factor < math.inf:
-        message = f"'{shortened(written)}' is not a unit; {needs(unit)}"
-        raise QuantityError(message)
+        _refuse(written, unit)
     return factor
 
 
-def _to_expression(unit: str) -> str:
-    """Rewrite UDUNITS and everyday spelling (``kg m-3``, ``kg/m3``, ``m^2``) for pint."""
-    text = unit.strip().replace("%", "percent").replace("·", " ").replace("³", "3")
-    text = text.replace("²", "2").replace("^", "**")
-    if text in ("", "1"):
-        return "dimensionless"
-    if len(text) > _LONGEST_UNIT or not _SIGNS.fullmatch(_FACTOR.sub(" ", text)):
-        message = f"'{shortened(unit)}' is not a unit"
-        raise QuantityError(message)
-    text = _POWER.sub(r"\1**(\2)", text)
-    return re.sub(r"(?<=[\w)°])\s+(?=[A-Za-zµμ°(])", " * ", text)
+def _refuse(written: str, unit: str) -> NoReturn:
+    message = f"'{shortened(written)}' is not a unit; {needs(unit)}"
+    raise QuantityError(message)
 
 
-def _dimension_name(unit: Any) -> str:
-    registry = _registry()
-    for known, name in _DIMENSIONS.items():
-        if registry.parse_units(_to_expression(known)).dimensionality == unit.dimensionality:
-            return name
-    return "another kind of quantity"
+def _dimension_name(unit: _Unit) -> str:
+    kinds = {_to_unit(known).powers: name for known, name in _DIMENSIONS.items()}
+    return kinds.get(unit.powers, "another kind of quantity")
 
 
 def needs(unit: str) -> str:

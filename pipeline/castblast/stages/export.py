@@ -6,13 +6,11 @@ fit that is kept beside where that would be.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from castblast.disk.files import write_json, write_with
+from castblast.disk.files import tried, write_bytes, write_json
 from castblast.disk.reading import read_json
 from castblast.disk.resources import SHIPPED_NETWORKS, is_bare_name, resource
 from castblast.errors import CheckError, SpecError, nearest_name
@@ -69,7 +67,9 @@ def export(
     MissingLibraryError
         A target needs a library that is not installed.
     SpecError
-        No usable network, an unknown target, a folder that cannot be written.
+        No usable network, an unknown target.
+    OutputError
+        The folder cannot be written to.
     CheckError
         A file that does not give the answers of the fitted estimator.
     """
@@ -81,16 +81,16 @@ def export(
         require(*_EXTRAS.get(target, ()), purpose=f"export target '{target}'")
     source = _find_source(fit)
     folder = source.parent / "export" if out is None else out
-    _require_writable(folder)
-    if source.name == FIT_FILE:
-        contents, reports = _export_module(source, wanted, verify, progress)
-    else:
-        network = read_network(source)
-        contents = _write(network, wanted, source, histories)
-        reports = _verify(network, contents, progress) if verify else {}
-    files, lines = [], []
-    for name, content in {k: v for part in contents.values() for k, v in part.items()}.items():
-        files.append(write_with(folder / name, partial(_write_bytes, content=content)))
+    lines = []
+    with tried(folder):
+        if source.name == FIT_FILE:
+            contents, reports = _export_module(source, wanted, verify, progress)
+        else:
+            network = read_network(source)
+            contents = _write(network, wanted, source, histories)
+            reports = _verify(network, contents, progress) if verify else {}
+        named = {name: content for part in contents.values() for name, content in part.items()}
+        files = [write_bytes(folder / name, content) for name, content in named.items()]
     for target, part in contents.items():
         size = sum(map(len, part.values())) / 1000
         line = f"{target}: {', '.join(part)} ({size:.1f} kB){_verdict(reports.get(target))}"
@@ -123,23 +123,6 @@ def _write(
     if faults:
         raise SpecError("\n".join(faults))
     return contents
-
-
-def _require_writable(folder: Path) -> None:
-    """Say that nothing can be written before minutes are spent on making it."""
-    place = folder
-    while not place.exists() and place != place.parent:
-        place = place.parent
-    if not place.is_dir():
-        message = f"{folder}: cannot be written, {place} is a file"
-        raise SpecError(message)
-    if not os.access(place, os.W_OK | os.X_OK):
-        message = f"{folder}: cannot be written, no permission to write in {place}"
-        raise SpecError(message)
-
-
-def _write_bytes(path: Path, content: bytes) -> None:
-    path.write_bytes(content)
 
 
 def find_network(fit: Path) -> Path:

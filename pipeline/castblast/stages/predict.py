@@ -11,6 +11,7 @@ from typing import Any
 
 from castblast.bands import BAND_HEADER, BAND_WORDS, show_band, show_value
 from castblast.design.variables import VARIABLES
+from castblast.names import as_words
 from castblast.network import Network
 from castblast.prediction.answer import load_network, predict
 from castblast.stages.outcome import Outcome
@@ -49,4 +50,4 @@ def _row(model: Network, name: str, document: Mapping[str, Any]) -> tuple[str, s
     elif document["domain"] == "unusual":
         low_high += " (unusual design)"
     value = show_value(name, document[name])
-    return (name.replace("_", " "), value, low_high, VARIABLES[name].shown_unit)
+    return (as_words(name), value, low_high, VARIABLES[name].shown_unit)

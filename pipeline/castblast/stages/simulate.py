@@ -13,6 +13,7 @@ from castblast.blast.run import BlastResult
 from castblast.design.variables import VARIABLES
 from castblast.disk.files import require_writable, write_csv, write_json, written_together
 from castblast.extras import require
+from castblast.names import as_words
 from castblast.specs.case import parse_values
 from castblast.specs.explosive import load_explosive
 from castblast.stages.outcome import Outcome
@@ -90,8 +91,8 @@ def _rows(document: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
         variable = VARIABLES.get(name)
         if variable is None or isinstance(value, bool):
             continue
-        words, unit = name.replace("_", " "), variable.shown_unit
-        rows.append((words, show_value(name, value), show_band(name, value), unit))
+        shown = (show_value(name, value), show_band(name, value), variable.shown_unit)
+        rows.append((as_words(name), *shown))
     return rows
 
 

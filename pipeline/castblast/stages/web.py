@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from castblast.disk.files import write_with
+from castblast.disk.files import write_bytes
 from castblast.disk.reading import read_json
 from castblast.disk.resources import resource
 from castblast.errors import SpecError
@@ -38,7 +37,7 @@ def shipped_page(out: Path | None = None) -> Path:
     if out is None:
         return page
     target = out / page.name if out.is_dir() else out
-    return write_with(target, partial(_write_bytes, content=page.read_bytes()))
+    return write_bytes(target, page.read_bytes())
 
 
 def build_page(network: Network, source: Path, histories: Path | None = None) -> Files:
@@ -109,7 +108,3 @@ def _require_fit(record: Mapping[str, Any], network: Network, path: Path) -> Non
             f"{record['dataset']['dataset_version']}, but the network was trained on other data"
         )
         raise SpecError(message)
-
-
-def _write_bytes(path: Path, content: bytes) -> None:
-    path.write_bytes(content)

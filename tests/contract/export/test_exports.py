@@ -7,7 +7,9 @@ not installed is skipped with the reason that users are told.
 
 import ast
 import csv
+import errno
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -15,13 +17,14 @@ import sys
 import zipfile
 from dataclasses import replace
 from io import BytesIO
+from pathlib import Path
 
 import numpy as np
 import pytest
 from toy_network import toy_network
 
 from castblast.bands import BASIS, PRIORS, Prior
-from castblast.errors import CheckError, SpecError
+from castblast.errors import CheckError, OutputError, SpecError
 from castblast.export.parity import TOLERANCE, check_parity
 from castblast.export.sheet.runner import recalculated
 from castblast.export.sheet.workbook import TOP
@@ -530,12 +533,16 @@ def test_unknown_targets(source, to: str, words: str) -> None:
 
 def test_a_folder_that_cannot_be_written(source, tmp_path, monkeypatch) -> None:
     (tmp_path / "file").write_text("x")
-    with pytest.raises(SpecError, match="is a file"):
+    with pytest.raises(OutputError, match="cannot be written to: "):
         export(source, tmp_path / "file" / "out")
-    monkeypatch.setattr("castblast.stages.export.os.access", lambda *_: False)
-    with pytest.raises(SpecError, match="no permission to write"):
+    monkeypatch.setattr("pathlib.Path.write_bytes", _refused)
+    with pytest.raises(OutputError, match="cannot be written to: Permission denied"):
         export(source, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def _refused(path: Path, content: bytes) -> int:
+    raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
 
 
 def test_a_missing_tool_is_said(source, tmp_path, monkeypatch) -> None:

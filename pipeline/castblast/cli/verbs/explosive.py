@@ -7,6 +7,7 @@ import typer
 
 from castblast.cli.screen import Screen
 from castblast.cli.verb import verb
+from castblast.names import as_words
 
 app = typer.Typer(help="The catalogue of explosives and their checks.", no_args_is_help=True)
 
@@ -59,22 +60,18 @@ def show(screen: Screen, name: _Name) -> Mapping[str, Any]:
 
     description = describe(name)
     rows = [
-        (f"{_words(key)} {part}".strip(), f"{value * factor:.5g}", unit)
+        (f"{as_words(key)} {part}".strip(), f"{value * factor:.5g}", unit)
         for key, (unit, factor) in _SHOWN.items()
         for part, value in _parts(description[key])
     ]
     title = f"{description['name']} ({description['form']})"
     screen.table(("quantity", "value", "unit"), rows, title=title)
-    derived = ", ".join(_words(key) for key in description["derived"])
+    derived = ", ".join(as_words(key) for key in description["derived"])
     texts = (description["source"], derived, description["notes"])
     for label, text in zip(("Source", "Derived by this project", "Notes"), texts, strict=True):
         if text:
             screen.say(f"{label}: {text}")
     return description
-
-
-def _words(key: str) -> str:
-    return key.replace("_", " ")
 
 
 def _parts(value: float | Mapping[str, float] | None) -> list[tuple[str, float]]:

@@ -22,6 +22,7 @@ from castblast.dataset.building.meter import Meter
 from castblast.dataset.building.shards import ShardReport, ShardTask, run_shard
 from castblast.dataset.building.work import Work
 from castblast.errors import DatasetError, SimulationError, SpecError
+from castblast.jobs import available_cores
 from castblast.progress import ProgressCallback, silent
 from castblast.stopping import interruptible
 
@@ -169,7 +170,7 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[tuple[Any, C
         with _remote(scheduler) as client:
             yield client, _ThreadCount(client)
         return
-    count = workers or _cores()
+    count = workers or available_cores()
     with _local_cluster(count) as cluster, Client(cluster, set_as_default=False) as client:
         yield client, lambda: count
 
@@ -252,12 +253,6 @@ def _quiet_dask() -> Iterator[None]:
     finally:
         for logger, level in zip(loggers, levels, strict=True):
             logger.setLevel(level)
-
-
-def _cores() -> int:
-    """Cores that this process may use."""
-    affinity = getattr(os, "sched_getaffinity", None)
-    return len(affinity(0)) if affinity else os.cpu_count() or 1
 
 
 def _progress_line(work: Work, meter: Meter) -> str:

@@ -226,7 +226,7 @@ def draw_batch(recipe: Recipe, count: int, rng: np.random.Generator) -> dict[str
     """
     sampled = recipe.sampled
     shares = qmc.LatinHypercube(d=len(sampled), rng=rng).random(count)
-    raw = {spec.name: _quantiles(spec, shares[:, j]) for j, spec in enumerate(sampled)}
+    raw = {spec.name: quantiles(spec, shares[:, j]) for j, spec in enumerate(sampled)}
     raw |= {spec.name: np.full(count, spec.at(0.0)) for spec in recipe.fixed}
     for spec in (*sampled, *recipe.fixed):
         if spec.ratio_of is not None:
@@ -274,15 +274,15 @@ def _stream(recipe: Recipe, purpose: int, number: int) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence(recipe.seed, spawn_key=(purpose, number)))
 
 
-def _quantiles(spec: VariableSpec, shares: FloatArray) -> FloatArray:
+def quantiles(spec: VariableSpec, shares: FloatArray) -> FloatArray:
+    """Marginal of a sampled variable at the shares (n,)."""
     low, high = spec.at(0.0), spec.at(1.0)
     if spec.distribution == "log_uniform":
         values = np.exp(np.log(low) + shares * (np.log(high) - np.log(low)))
     else:
         values = low + shares * (high - low)
-    return np.asarray(
-        np.clip(values, low, high)
-    )  # rounding of exp and log must not leave the range
+    # Rounding of exp and log must not leave the range.
+    return np.asarray(np.clip(values, low, high))
 
 
 def _balanced(size: int, kinds: int, rng: np.random.Generator) -> NDArray[np.int8]:

@@ -15,6 +15,7 @@ from castblast.design.rule import (
 )
 from castblast.design.variables import INPUTS, VARIABLES
 from castblast.export.sheet.block import in_formula
+from castblast.names import as_words
 from castblast.network import Network
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ def _bounds(name: str, cell: str) -> str:
     variable = VARIABLES[name]
     margin = 1e-12 * max(abs(variable.lower), abs(variable.upper))
     allowed = f"{variable.show(variable.lower)} to {variable.show(variable.upper)}"
-    lead, end = in_formula(f"{_spoken(name)} "), in_formula(f" is not plausible: {allowed}. ")
+    lead, end = in_formula(f"{as_words(name)} "), in_formula(f" is not plausible: {allowed}. ")
     inside = f"AND({cell}>={variable.lower - margin!r},{cell}<={variable.upper + margin!r})"
     return f'IF({inside},"",{lead}&{_shown(cell, name)}&{end})'
 
@@ -75,10 +76,10 @@ def _rule(rule: DesignRule, known: Mapping[str, str]) -> str:
     words, end = [], 0
     for field in MESSAGE_FIELD.finditer(rule.message):
         factor, name, as_name = field.groups()
-        words.append(in_formula(_spoken(rule.message[end : field.start()])))
+        words.append(in_formula(as_words(rule.message[end : field.start()])))
         words.append(_shown(f"{factor or '1'}*{known[name]}", as_name or name))
         end = field.end()
-    words.append(in_formula(f"{_spoken(rule.message[end:])}. "))
+    words.append(in_formula(f"{as_words(rule.message[end:])}. "))
     return f'IF({"+".join(parts)}<-{ROUND_OFF!r}*MAX({sizes}),{"&".join(words)},"")'
 
 
@@ -91,7 +92,3 @@ def _shown(formula: str, name: str) -> str:
     variable = VARIABLES[name]
     unit = "" if variable.shown_unit == "1" else f" {variable.shown_unit}"
     return f"ROUND({formula}*{variable.display_factor!r},4)&{in_formula(unit)}"
-
-
-def _spoken(text: str) -> str:
-    return text.replace("_", " ")

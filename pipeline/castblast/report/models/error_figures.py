@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from castblast.design.variables import VARIABLES
+from castblast.names import as_words
 from castblast.report.style import (
     CYCLE,
     in_style,
@@ -16,7 +17,6 @@ from castblast.report.style import (
     plain_log_ticks,
     save_figure,
     with_unit,
-    words,
 )
 
 Document = Mapping[str, Any]
@@ -89,7 +89,7 @@ def draw_strata(path: Path, title: str, strata: Document) -> Path:
         for target, colour in zip(cells[0]["targets"], CYCLE, strict=False):
             errors = [_percent(c["targets"][target]["relative_error_95"]) for c in cells]
             axis.plot(middle, errors, "o-", markersize=2.5, linewidth=1.2, color=colour,
-                      label=words(target))  # fmt: skip
+                      label=as_words(target))  # fmt: skip
         axis.set_xlabel(with_unit(name), fontsize=8)
         axis.set_yscale("log")
         plain_log_ticks(axis.yaxis)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from castblast.names import as_words
 from castblast.report.style import (
     BLUE,
     GREY,
@@ -17,7 +18,6 @@ from castblast.report.style import (
     new_figure,
     plain_log_ticks,
     save_figure,
-    words,
 )
 from castblast.types import FloatArray
 
@@ -80,7 +80,7 @@ def _draw_indices(axis: Any, report: Document, target: str, order: Sequence[str]
                 linestyle="none",
                 label=f"{model}, {report['physics']['rows']:,} rows" if kind == "total" else None,
             )  # fmt: skip
-    axis.set_title(words(target), fontsize=9)
+    axis.set_title(as_words(target), fontsize=9)
     axis.axvline(0.0, color=GREY, linewidth=0.6)
     axis.grid(visible=False, axis="y")
 
@@ -132,7 +132,7 @@ def _draw_law(axis: Any, target: str, entry: Document) -> None:
     if needed is not None:
         axis.plot(needed, 100.0 * entry["mark"], "*", color=RED, markersize=11,
                   label=f"{needed:,} runs needed")  # fmt: skip
-    axis.set(title=words(target), xlabel="training rows", ylabel="95 % of errors below [%]")
+    axis.set(title=as_words(target), xlabel="training rows", ylabel="95 % of errors below [%]")
     plain_log_ticks(axis.yaxis)
     axis.legend(fontsize=7)
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from castblast.names import as_words
 from castblast.report.style import (
     BLUE,
     GREEN,
@@ -18,7 +19,6 @@ from castblast.report.style import (
     new_figure,
     plain_log_ticks,
     save_figure,
-    words,
 )
 
 Document = Mapping[str, Any]
@@ -95,7 +95,7 @@ def _draw_target(axis: Any, comparison: Document, target: str) -> None:
         axis.axvline(published, **{**_MARK, "linestyle": ":"})
     axis.set_xscale("log")
     plain_log_ticks(axis.xaxis)
-    axis.set_title(words(target), fontsize=9)
+    axis.set_title(as_words(target), fontsize=9)
 
 
 def _colour(entry: Document, comparison: Document) -> str:
@@ -125,7 +125,7 @@ def draw_gate(path: Path, gates: Mapping[str, Document]) -> Path:
             _draw_cell(axis, column, row, by_name.get(rule))
     axis.set_xlim(-0.5, len(names) - 0.5)
     axis.set_ylim(len(checks) - 0.5, -0.5)
-    axis.set_yticks(range(len(checks)), [words(check) for check in checks], fontsize=8)
+    axis.set_yticks(range(len(checks)), [as_words(check) for check in checks], fontsize=8)
     axis.set_xticks(range(len(names)), names, rotation=40, ha="right", fontsize=8)
     for tick, name in zip(axis.get_xticklabels(), names, strict=True):
         tick.set_color("black" if gates[name]["passed"] else RED)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from castblast.design.variables import VARIABLES
+from castblast.names import as_words
 from castblast.report.style import (
     BLUE,
     CYCLE,
@@ -21,7 +22,6 @@ from castblast.report.style import (
     new_figure,
     plain_log_ticks,
     save_figure,
-    words,
 )
 from castblast.types import FloatArray
 
@@ -130,15 +130,15 @@ def _draw_learning(
     main = next(line for line in lines if line.target == target)
     others = [line for line in lines if line is not main]
     axis.loglog(main.rows, _percent(main.test), "o-", color=BLUE, linewidth=2.2, zorder=4,
-                label=words(target))  # fmt: skip
+                label=as_words(target))  # fmt: skip
     axis.loglog(main.rows, _percent(main.train), ":", color=BLUE, linewidth=1.2, zorder=4,
-                label=f"{words(target)}, training rows")  # fmt: skip
+                label=f"{as_words(target)}, training rows")  # fmt: skip
     for line, (marker, dash) in zip(others, _OTHER_TARGETS, strict=False):
         axis.loglog(line.rows, _percent(line.test), color=GREY, marker=marker, markersize=3.5,
-                    linestyle=dash, linewidth=1.0, label=words(line.target))  # fmt: skip
+                    linestyle=dash, linewidth=1.0, label=as_words(line.target))  # fmt: skip
     mark = 100.0 * marks["relative_error_95"]
     axis.plot(marks["runs"], mark, "*", markersize=11, color="#222222", linestyle="none", zorder=5,
-              label=f"{words(target)}, as published: {mark:g} %")  # fmt: skip
+              label=f"{as_words(target)}, as published: {mark:g} %")  # fmt: skip
     axis.set(
         title="a) Learning curve, test rows",
         xlabel="training rows",
@@ -173,7 +173,7 @@ def _draw_histogram(axis: Any, rows: HeldOutRows, target: str, marks: Mapping[st
         transform=axis.transAxes, ha="right", va="top", fontsize=8, bbox=_PLATE,
     )  # fmt: skip
     axis.set(
-        title=f"b) Error of {words(target)}, test rows",
+        title=f"b) Error of {as_words(target)}, test rows",
         xlabel="relative error [%]; what lies beyond is in the outer bins",
         ylabel="rows",
     )
@@ -189,7 +189,7 @@ def _draw_parity(axis: Any, rows: HeldOutRows, target: str, letter: str = "") ->
     for kind, colour in zip(np.unique(rows.explosive), CYCLE, strict=False):
         own = rows.explosive == kind
         axis.scatter(truth[own], predicted[own], s=5, linewidths=0, alpha=0.6, color=colour,
-                     label=words(str(kind)), rasterized=True)  # fmt: skip
+                     label=as_words(str(kind)), rasterized=True)  # fmt: skip
     r2, error = (rows.scores[target][name] for name in ("r2", "relative_error_95"))
     shown = "-" if r2 is None else f"{floor(r2 * 1e5) / 1e5:.5f}"
     axis.text(
@@ -197,7 +197,7 @@ def _draw_parity(axis: Any, rows: HeldOutRows, target: str, letter: str = "") ->
         transform=axis.transAxes, ha="right", va="bottom", fontsize=8,
     )  # fmt: skip
     axis.set(
-        title=f"{letter}{words(target)[0].upper()}{words(target)[1:]}",
+        title=f"{letter}{as_words(target)[0].upper()}{as_words(target)[1:]}",
         xlabel=f"simulated [{variable.shown_unit}]",
         ylabel=f"predicted [{variable.shown_unit}]",
         aspect="equal",
@@ -213,7 +213,7 @@ def _draw_by_explosive(axis: Any, rows: HeldOutRows, marks: Mapping[str, float])
         places = np.arange(len(targets)) + (k - (len(kinds) - 1) / 2) * height
         axis.barh(places, values, height=0.9 * height, color=colour)
     axis.axvline(100.0 * marks["relative_error_95"], **_MARK)
-    axis.set_yticks(range(len(targets)), [words(t).replace(" ", "\n", 1) for t in targets])
+    axis.set_yticks(range(len(targets)), [as_words(t).replace(" ", "\n", 1) for t in targets])
     axis.invert_yaxis()
     axis.grid(visible=False, axis="y")
     axis.set(

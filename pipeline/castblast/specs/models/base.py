@@ -9,7 +9,7 @@ from pydantic import Field, field_validator, model_validator
 
 from castblast.design.variables import INPUT_NAMES, OUTPUT_NAMES, VARIABLES
 from castblast.errors import nearest_name
-from castblast.names import is_variable
+from castblast.names import each_once, is_variable
 from castblast.network import Transform
 from castblast.specs.loading import Name, Spec
 from castblast.specs.models.search import SearchSpace
@@ -118,11 +118,7 @@ class SurrogateSpec(Spec):
     @field_validator("features", "targets", "linear_features")
     @classmethod
     def _distinct(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        twice = sorted({name for name in names if names.count(name) > 1})
-        if twice:
-            message = f"given twice: {', '.join(twice)}"
-            raise ValueError(message)
-        return names
+        return each_once(names)
 
     @model_validator(mode="after")
     def _known_names(self) -> Self:

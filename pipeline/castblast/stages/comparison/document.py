@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from castblast.disk.files import write_csv, write_json, write_text
+from castblast.names import as_words
 from castblast.stages.comparison.page import write_costs, write_page
 from castblast.stages.outcome import Outcome
 from castblast.stages.training.fitting import fit_title, held_out
@@ -156,7 +157,7 @@ def outcome(found: Comparison, document: Mapping[str, Any], out: Path) -> Outcom
     paper = league["paper"]
     first = _HEADLINE if _HEADLINE in league["targets"] else league["targets"][0]
     others = [name for name in league["targets"] if name != first]
-    shown = [name.replace("_", " ") for name in (first, *others)]
+    shown = [as_words(name) for name in (first, *others)]
     header = ["model", "gate", "export", f"{shown[0]}: R²", *(f"{name}: 95 %" for name in shown)]
     rows = []
     for entry in league["league"]:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from castblast.design.variables import VARIABLES
+from castblast.names import as_words
 from castblast.report.html import Picture, Section, Table, write_report
 from castblast.stages.training.train import show_r_squared, show_share
 from castblast.version import __version__
@@ -107,11 +108,11 @@ def _league(document: Document, pictures: Sequence[Path]) -> Section:
         errors.append([name, gate, export, first, *map(_error, figures)])
         weights = "-" if entry["parameters"] is None else f"{entry['parameters']:,}"
         squares.append([name, weights, *(show_r_squared(figure["r2"]) for figure in figures)])
-    words = [_words(name) for name in targets]
+    words = [as_words(name) for name in targets]
     paper = document["paper"]
     caption = (
         f"95 % relative error (95 % interval, bootstrap over test rows), best validation error "
-        f"first. Published for {_words(paper['target'])}: 95 % within "
+        f"first. Published for {as_words(paper['target'])}: 95 % within "
         f"{paper['relative_error_95']:.1%}, R² {paper['r2']}, from {paper['runs']:,} runs."
     )
     tables = [
@@ -157,7 +158,7 @@ def _marks(document: Document) -> Section:
                 rows.append(
                     [
                         entry["name"],
-                        _words(target),
+                        as_words(target),
                         f"{mark['r2']:g}",
                         show_r_squared(figures["r2"]),
                         show_share(mark["relative_error_95"]),
@@ -186,7 +187,7 @@ def _gate(document: Document, pictures: Sequence[Path]) -> Section | None:
     first = document["chosen"] or document["best_exportable"]
     rows = [
         [
-            _words(check["name"]),
+            as_words(check["name"]),
             check["says"],
             f"{check['asked']:,}" if check["asked"] else check.get("not_asked", ""),
             f"{check['broken']:,}" if check["asked"] else "",
@@ -207,7 +208,7 @@ def _gate(document: Document, pictures: Sequence[Path]) -> Section | None:
 def _reasons(reasons: Sequence[str]) -> str:
     left = len(reasons) - _REASONS
     more = f"; and {left} more" if left > 0 else ""
-    return "; ".join(_words(reason) for reason in reasons[:_REASONS]) + more
+    return "; ".join(as_words(reason) for reason in reasons[:_REASONS]) + more
 
 
 def _learning(document: Document, pictures: Sequence[Path]) -> Section:
@@ -218,7 +219,7 @@ def _learning(document: Document, pictures: Sequence[Path]) -> Section:
             rows.append(
                 [
                     name,
-                    _words(target),
+                    as_words(target),
                     show_share(entry["mark"]),
                     "-" if entry["reached_at"] is None else f"{entry['reached_at']:,.0f}",
                     "-" if needed is None else f"{needed:,.0f}",
@@ -272,10 +273,10 @@ def _shifts(document: Document, pictures: Sequence[Path]) -> Section | None:
 def _strata(document: Document, pictures: Sequence[Path]) -> Section:
     targets = document["targets"]
     rows = [
-        [_words(kind), *(show_share(scores[name]["relative_error_95"]) for name in targets)]
+        [as_words(kind), *(show_share(scores[name]["relative_error_95"]) for name in targets)]
         for kind, scores in document["strata"]["by_explosive"].items()
     ]
-    table = Table(("explosive", *map(_words, targets)), rows, "95 % relative error, test rows")
+    table = Table(("explosive", *map(as_words, targets)), rows, "95 % relative error, test rows")
     shown = _pictures(pictures, "strata") + _pictures(pictures, "error_maps")
     return Section("Where the chosen model errs", tables=[table], pictures=shown)
 
@@ -284,12 +285,12 @@ def _worst(document: Document) -> Section:
     rows = [
         [
             f"{case['sample']}",
-            _words(case["explosive"]),
-            _words(case["target"]),
+            as_words(case["explosive"]),
+            as_words(case["target"]),
             "-" if case["relative_error"] is None else f"{case['relative_error']:+.2%}",
             "inside" if case["in_domain"] else "outside",
-            f"{_words(case['edge']['input'])} at {case['edge']['place']:.0%}",
-            ", ".join(f"{_words(n)} {VARIABLES[n].show(v)}" for n, v in case["inputs"].items()),
+            f"{as_words(case['edge']['input'])} at {case['edge']['place']:.0%}",
+            ", ".join(f"{as_words(n)} {VARIABLES[n].show(v)}" for n, v in case["inputs"].items()),
         ]
         for case in document["worst_cases"]
     ]
@@ -324,7 +325,7 @@ def _sobol(document: Document, pictures: Sequence[Path]) -> Section | None:
             "total, simulator on few rows",
             "total, model on the same rows",
         )
-        tables.append(Table(header, rows, _words(target)))
+        tables.append(Table(header, rows, as_words(target)))
     return Section(
         "Which inputs matter: Sobol indices",
         [f"{sobol['method']}, {sobol['rows']:,} base points; 95 % intervals in brackets."],
@@ -344,10 +345,6 @@ def _pictures(pictures: Sequence[Path], stem: str) -> list[Picture]:
         for path in pictures
         if path.stem == stem
     ]
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")
 
 
 def _number(value: float | None) -> str:

@@ -14,6 +14,7 @@ from castblast.dataset.rows.design_file import write_design_file
 from castblast.dataset.rows.simulation import blast_simulator
 from castblast.disk.resources import is_bare_name
 from castblast.errors import SpecError
+from castblast.names import as_words
 from castblast.network import Network, explosive_index, member_spread
 from castblast.progress import ProgressCallback, part, silent
 from castblast.specs.models.model import ModelSpec, make_model_spec, read_model_spec, refuse_code
@@ -155,7 +156,7 @@ def _outcome(
     """Say how much wider the spread is where the new rows lie."""
     medians = np.median(spread, axis=0)
     rows = [
-        (name.replace("_", " "), f"{100 * u:.3g} %", f"{100 * m:.3g} %", f"{m / u:.2g}")
+        (as_words(name), f"{100 * u:.3g} %", f"{100 * m:.3g} %", f"{m / u:.2g}")
         for name, u, m in zip(targets, usual.tolist(), medians.tolist(), strict=True)
     ]
     document = {

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from castblast.names import as_words
 from castblast.version import __version__
 from castblast.bands import BAND_SENTENCE, BAND_TITLE, show_band, show_value
 from castblast.report.html import Picture, Section, Table, write_report
@@ -111,7 +112,7 @@ def _prediction(folder: Path) -> Section:
         band = document["network_band"][name]["relative"]
         rows.append(
             (
-                name.replace("_", " "),
+                as_words(name),
                 f"{show_value(name, predicted)} {variable.shown_unit}",
                 f"{show_band(name, predicted, band)} {variable.shown_unit}",
                 f"{show_value(name, simulated)} {variable.shown_unit}",
@@ -157,7 +158,7 @@ def _muckpile(folder: Path) -> Section:
         "energy": "Energy over time",
     }
     pictures = [
-        Picture(path, captions.get(path.stem, path.stem.replace("_", " ")))
+        Picture(path, captions.get(path.stem, as_words(path.stem)))
         for path in sorted(folder.glob("*.png"), key=lambda p: list(captions).index(p.stem)
                            if p.stem in captions else len(captions))
     ]  # fmt: skip

@@ -18,6 +18,7 @@ from castblast.errors import SpecError
 from castblast.identity import make_key
 from castblast.muckpile.results.metrics import UNITS, Band, band
 from castblast.muckpile.results.profile import Profile
+from castblast.names import as_words
 from castblast.progress import ProgressCallback, silent
 from castblast.specs.bench.bench import BenchSpec
 from castblast.stages.muckpile.read import FinishedRun, numbers, read_runs
@@ -174,8 +175,8 @@ def band_rows(bands: Mapping[str, Band]) -> list[tuple[str, str, str]]:
         if found.mean.ndim:
             continue
         spread = "" if math.isnan(found.sd) else f" ± {float(found.sd):.2g}"
-        words = "-" if math.isnan(found.mean) else f"{float(found.mean):.3g}{spread}"
-        rows.append((name.replace("_", " "), words, UNITS[name]))
+        value = "-" if math.isnan(found.mean) else f"{float(found.mean):.3g}{spread}"
+        rows.append((as_words(name), value, UNITS[name]))
     return rows
 
 

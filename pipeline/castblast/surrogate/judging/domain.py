@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from castblast.dataset.file.provenance import stored_explosives
+from castblast.dataset.rows.design import quantiles
 from castblast.dataset.rows.simulation import Simulator, blast_simulator
 from castblast.errors import DatasetError
-from castblast.specs.recipe import Recipe, VariableSpec, recipe_from_text
+from castblast.specs.recipe import Recipe, recipe_from_text
 from castblast.types import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -168,7 +169,7 @@ class Domain:
     def _raw(self, shares: FloatArray) -> dict[str, FloatArray]:
         """Variables of the recipe at places of the unit box."""
         recipe = self.recipe
-        raw = {spec.name: _quantiles(spec, shares[:, j]) for j, spec in enumerate(recipe.sampled)}
+        raw = {spec.name: quantiles(spec, shares[:, j]) for j, spec in enumerate(recipe.sampled)}
         raw |= {spec.name: np.full(len(shares), spec.at(0.0)) for spec in recipe.fixed}
         for spec in (*recipe.sampled, *recipe.fixed):
             if spec.ratio_of is not None:
@@ -226,13 +227,3 @@ def dataset_domain(dataset: xr.Dataset, where: str = "dataset") -> Domain:
     explosives = tuple(entry.spec.to_explosive() for entry in stored.values())
     energy = np.array([entry.density * entry.heat_of_explosion for entry in explosives])
     return Domain(recipe, blast_simulator(recipe, explosives), tuple(stored), energy)
-
-
-def _quantiles(spec: VariableSpec, shares: FloatArray) -> FloatArray:
-    """Marginal of a sampled variable at the shares (n,)."""
-    low, high = spec.at(0.0), spec.at(1.0)
-    if spec.distribution == "log_uniform":
-        values = np.exp(np.log(low) + shares * (np.log(high) - np.log(low)))
-    else:
-        values = low + shares * (high - low)
-    return np.asarray(np.clip(values, low, high))
