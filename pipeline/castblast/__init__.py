@@ -20,6 +20,8 @@ from castblast.version import __version__
 
 if TYPE_CHECKING:
     from castblast.api.catalogue import explosives, variables
+    from castblast.api.datasets import generate, open_dataset
+    from castblast.api.fitting import compare, fit
     from castblast.api.many import sample, simulate_many
     from castblast.api.model import Model, load_model
     from castblast.api.simulation import simulate
@@ -27,8 +29,12 @@ if TYPE_CHECKING:
 __all__ = [
     "Model",
     "__version__",
+    "compare",
     "explosives",
+    "fit",
+    "generate",
     "load_model",
+    "open_dataset",
     "sample",
     "simulate",
     "simulate_many",
@@ -37,6 +43,10 @@ __all__ = [
 
 _HOMES = {
     "Model": "model",
+    "compare": "fitting",
+    "fit": "fitting",
+    "generate": "datasets",
+    "open_dataset": "datasets",
     "explosives": "catalogue",
     "load_model": "model",
     "sample": "many",

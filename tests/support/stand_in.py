@@ -114,8 +114,8 @@ def wait_for(condition, seconds=_START_SECONDS):
 
 
 def main(seconds, arguments):
+    import castblast.dataset.building.produce
     import castblast.stages.datasets.extend
-    import castblast.stages.datasets.generate
     from castblast.cli import main as run
     from castblast.dataset.rows.simulation import blast_simulator
 
@@ -125,7 +125,7 @@ def main(seconds, arguments):
         # as workers import it, not as the script that this is
         return import_module("stand_in").SlowBlast(**values, seconds=seconds)
 
-    castblast.stages.datasets.generate.blast_simulator = stand_in
+    castblast.dataset.building.produce.blast_simulator = stand_in
     castblast.stages.datasets.extend.blast_simulator = stand_in
     return run(arguments)
 

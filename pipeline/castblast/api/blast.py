@@ -16,6 +16,7 @@ from castblast.blast.run import (
 )
 from castblast.design.variables import VARIABLES
 from castblast.errors import Status, nearest_name
+from castblast.names import as_words
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -194,15 +195,15 @@ class Blast:
         return f"<Blast of {self.explosive}: {shown}>"
 
     def _repr_html_(self) -> str:
-        given = [(_words(q.name), VARIABLES[q.name].show(q)) for q in self.inputs.values()]
+        given = [(as_words(q.name), VARIABLES[q.name].show(q)) for q in self.inputs.values()]
         units = {name: VARIABLES[name].shown_unit for name in self.outputs}
         found = [
-            (_words(name), show_value(name, q), show_band(name, q), units[name])
+            (as_words(name), show_value(name, q), show_band(name, q), units[name])
             for name, q in self.outputs.items()
             if q.band is not None
         ]
         work = self.outputs["gas_work"].value
-        shares = [(_words(name), self.outputs[name].value / work) for name in _NEAR]
+        shares = [(as_words(name), self.outputs[name].value / work) for name in _NEAR]
         return box(
             f"{self.explosive}, {self.mode} mode, {self.parameters} parameters",
             table(("output", "value", BAND_TITLE, "unit"), found),
@@ -223,7 +224,3 @@ def _history(
     attributes = {"units": "s", "long_name": words}
     dataset: xr.Dataset = xarray.Dataset(columns, coords={"time": ("time", time, attributes)})
     return dataset
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")

@@ -14,24 +14,41 @@ from castblast.bands import BAND_TITLE, BAND_WORDS, prediction_factor
 from castblast.design.variables import VARIABLES
 from castblast.disk.files import write_text
 from castblast.errors import SpecError
-from castblast.network import Network, offending_inputs
+from castblast.names import as_words
+from castblast.network import (
+    Evaluate,
+    Network,
+    Shell,
+    evaluate_rows,
+    explosive_index,
+    offending_inputs,
+)
 from castblast.network.json_file import to_json
 from castblast.prediction.answer import load_network
 from castblast.prediction.blanks import predict_with_blanks
 from castblast.prediction.columns import ColumnPredictions, explosive_position, held_inputs
 from castblast.specs.case import require_none
-from castblast.types import IntArray
+from castblast.types import FloatArray, IntArray
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
+
+    from castblast.surrogate.fitting.training import Fit
+
+_SCORES = ("r2", "relative_error_95", "share_within", "rows")
 
 
 class Model:
-    """A network with its units, bands and training domain; made by `load_model` or `fit`.
+    """A model with its units, bands and training domain; made by `load_model` or `fit`.
 
     Parameters
     ----------
-    network : Network
+    network : Network, or Shell of a model of another shape
+    evaluate : callable, optional
+        What computes the values of a model that is no network.
+    fit : Fit, optional
+        Where it comes from.
 
     Examples
     --------
@@ -41,8 +58,10 @@ class Model:
     {'unit': 'm', 'lower': 1.0..., 'upper': 15.0...}
     """
 
-    def __init__(self, network: Network) -> None:
-        self._network = network
+    def __init__(
+        self, network: Shell, evaluate: Evaluate | None = None, fit: Fit | None = None
+    ) -> None:
+        self._network, self._evaluate, self._fit = network, evaluate, fit
 
     @property
     def name(self) -> str:
@@ -52,8 +71,22 @@ class Model:
 
     @property
     def network(self) -> Network:
-        """The record itself, for castblast's own functions."""
+        """The record itself, for castblast's own functions.
+
+        Raises
+        ------
+        SpecError
+            The model is no chain of dense layers.
+        """
+        if not isinstance(self._network, Network):
+            message = f"{self.name}: no chain of dense layers, so no network.json can hold it"
+            raise SpecError(message, field="model", value=self.name)
         return self._network
+
+    @property
+    def fitted(self) -> Fit | None:
+        """The fit it comes from, with its estimator and table; None for one read from a file."""
+        return self._fit
 
     @property
     def inputs(self) -> pd.DataFrame:
@@ -138,7 +171,7 @@ class Model:
         pandas = library("pandas", "Model.predict")
         read = read_designs(designs, explosive)
         index = self._explosives(read)
-        answers = predict_with_blanks(read.columns, index, self._network)
+        answers = predict_with_blanks(read.columns, index, self._network, self._evaluate)
         read.require_possible(answers.designs.faults)
         columns: dict[str, Any] = {}
         for j, name in enumerate(self._network.output_names):
@@ -169,7 +202,89 @@ class Model:
         """
         path = Path(path)
         file = path if path.suffix == ".json" else path / "network.json"
-        return write_text(file, to_json(self._network))
+        return write_text(file, to_json(self.network))
+
+    def score(self, dataset: xr.Dataset | str | Path, split: str | None = "test") -> pd.DataFrame:
+        """Compare with simulated rows.
+
+        Parameters
+        ----------
+        dataset : Dataset or path
+        split : str, optional
+            None: all finished rows.
+
+        Returns
+        -------
+        DataFrame
+            One row for each output: `r2`; `relative_error_95`, the 95th-percentile relative error;
+            `share_within`, rows within 2.5 %; number of `rows`.
+
+        Raises
+        ------
+        DatasetError
+            A column that the model needs is missing, or an explosive it does not know.
+
+        Examples
+        --------
+        >>> import castblast as cb
+        >>> ds = cb.generate("full", size=100, workers=1)
+        >>> bool(cb.load_model("full").score(ds, split=None)["r2"].min() > 0.999)
+        True
+        """
+        from castblast.api.datasets import decoded, open_dataset
+        from castblast.surrogate.fitting.metrics import score_targets
+
+        opened = open_dataset(dataset) if isinstance(dataset, str | Path) else decoded(dataset)
+        names, outputs = self._network.input_names, self._network.output_names
+        x, y = opened.castblast.training_table(
+            split, features=names, targets=outputs, one_hot=False
+        )
+        index = np.array([explosive_index(self._network, str(e)) for e in x["explosive"]])
+        values = self._values(x[list(names)].to_numpy(), index)
+        scores = score_targets(y.to_numpy(), values, outputs)
+        return frame(
+            {key: [getattr(scores[name], key) for name in outputs] for key in _SCORES},
+            list(outputs),
+            "output",
+            "Model.score",
+        )
+
+    def export(self, path: str | Path, *, verify: bool = True) -> list[Path]:
+        """Write the model for another tool.
+
+        Parameters
+        ----------
+        path : str or path
+            Its suffix chooses the target: ``.json``, ``.onnx``, ``.c``, ``.js``, ``.py``,
+            ``.xlsx``, ``.html``. Files that belong to it (``model.h``) go beside it.
+        verify : bool
+            Run the file on the golden rows first; nothing is written if it disagrees. What cannot
+            be run here is written with a warning.
+
+        Returns
+        -------
+        list of path
+
+        Raises
+        ------
+        MissingLibraryError
+            The target needs a library that is not installed.
+        SpecError
+            No target has this suffix, or it cannot carry the model.
+        CheckError
+            The file does not give the answers of the fitted estimator.
+        """
+        from castblast.api.exports import write_module, write_network
+
+        if self._fit is not None and self._fit.network is None:
+            return write_module(self._fit, Path(path), verify=verify)
+        return write_network(self.network, Path(path), verify=verify)
+
+    def _values(self, numeric: FloatArray, index: IntArray) -> FloatArray:
+        """Outputs (n, m) of rows of SI inputs (n, k)."""
+        if self._evaluate is not None:
+            return self._evaluate(numeric, index)
+        return evaluate_rows(self.network, numeric, index)
 
     def _explosives(self, read: Designs) -> IntArray:
         """Position of the explosive of every row."""
@@ -215,12 +330,12 @@ class Model:
 
     def _repr_html_(self) -> str:
         inputs = [
-            (_words(c.name), f"{VARIABLES[c.name].show(c.lower)} to {c.show(c.upper)}")
+            (as_words(c.name), f"{VARIABLES[c.name].show(c.lower)} to {c.show(c.upper)}")
             for c in self._network.inputs
         ]
         outputs = [
             (
-                _words(c.name),
+                as_words(c.name),
                 f"a factor {prediction_factor(c.name, c.relative_band):.2g} either way",
                 f"{c.relative_band:.2%}",
             )
@@ -255,7 +370,3 @@ def load_model(name_or_path: str | Path = "full") -> Model:
     <Model levenberg: 14 inputs -> equilibrium_pressure, burden_velocity, crushed_zone_radius, expanded_hole_radius, trained on full 1.1.0>
     """  # noqa: E501 - one line of a screen
     return Model(load_network(Path(name_or_path)))
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from castblast.errors import CheckError
 from castblast.export.onnx.file import run_onnx_rows
 from castblast.export.source.answers import Answers, NotVerifiedError
 from castblast.export.source.plain import Files
@@ -155,6 +156,26 @@ def check_parity(network: Network, target: str, files: Files) -> ParityReport:
     except NotVerifiedError as reason:
         return ParityReport(target, 0, {}, {}, remark=f"not verified: {reason}")
     return replace(compare_outputs(network, target, found), tool=tool)
+
+
+def verify(network: Network, target: str, files: Files) -> ParityReport:
+    """Run exported files as `check_parity` does, and refuse those that disagree.
+
+    What cannot be run here, for want of a compiler say, comes back with a remark.
+
+    Raises
+    ------
+    CheckError
+        The files do not run, or do not give the answers of the fitted estimator; a line each.
+    """
+    try:
+        report = check_parity(network, target, files)
+    except CheckError as fault:
+        message = f"{target}: {fault}"
+        raise CheckError(message) from fault
+    if report.verified and report.faults:
+        raise CheckError("\n".join(f"{target}: {line}" for line in report.faults))
+    return report
 
 
 def check_wrapped_parity(shell: Shell, model: bytes) -> ParityReport:

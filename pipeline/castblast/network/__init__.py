@@ -19,7 +19,9 @@ from castblast.network.domain import (
 )
 from castblast.network.evaluate import (
     Bounds,
+    Evaluate,
     RowPredictions,
+    answer_rows,
     derived_matrix,
     evaluate,
     evaluate_rows,
@@ -56,6 +58,7 @@ __all__ = [
     "DerivedColumn",
     "DomainKind",
     "DomainViolation",
+    "Evaluate",
     "GoldenRows",
     "InputColumn",
     "Layer",
@@ -64,6 +67,7 @@ __all__ = [
     "RowPredictions",
     "Shell",
     "Transform",
+    "answer_rows",
     "density_reliefs",
     "density_score",
     "derived_matrix",

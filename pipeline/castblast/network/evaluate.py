@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,6 +30,10 @@ _ACTIVATIONS: dict[str, Callable[[FloatArray], FloatArray]] = {
     "logistic": _logistic,
     "silu": lambda x: x * _logistic(x),
 }
+
+
+#: Turns SI inputs (n, k) and positions of explosives (n,) into outputs (n, m) in SI.
+Evaluate: TypeAlias = Callable[[FloatArray, IntArray], FloatArray]
 
 
 class Bounds(NamedTuple):
@@ -152,14 +156,18 @@ def member_spread(network: Network, numeric: FloatArray, index: IntArray) -> Flo
 
 def predict_rows(network: Network, numeric: FloatArray, index: IntArray) -> RowPredictions:
     """Evaluate rows of SI inputs with bands and domain; parameters as `evaluate_rows`."""
-    values = evaluate_rows(network, numeric, index)
-    score = density_score(network, numeric)
+    return answer_rows(network, numeric, evaluate_rows(network, numeric, index))
+
+
+def answer_rows(shell: Shell, numeric: FloatArray, values: FloatArray) -> RowPredictions:
+    """Bands and domain about the outputs (n, m) of a model of any shape for rows (n, k); SI."""
+    score = density_score(shell, numeric)
     return RowPredictions(
         values,
-        prediction_bounds(network, values),
-        network_bounds(network, values),
+        prediction_bounds(shell, values),
+        network_bounds(shell, values),
         score,
-        in_domain(network, numeric, score),
+        in_domain(shell, numeric, score),
     )
 
 

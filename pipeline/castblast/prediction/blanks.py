@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from castblast.design.rule import COMPLETED, FaultyRows
 from castblast.design.variables import VARIABLES
-from castblast.network import Bounds, Network, RowPredictions
+from castblast.network import Bounds, Evaluate, RowPredictions, Shell
 from castblast.prediction.columns import (
     ColumnPredictions,
     NetworkDesigns,
@@ -27,7 +27,10 @@ from castblast.types import BoolArray, FloatArray
 
 
 def predict_with_blanks(
-    values: Mapping[str, FloatArray], explosive: NDArray[np.integer], network: Network
+    values: Mapping[str, FloatArray],
+    explosive: NDArray[np.integer],
+    network: Shell,
+    evaluate: Evaluate | None = None,
 ) -> ColumnPredictions:
     """Predict columns of designs in which NaN stands for a cell that is not given.
 
@@ -46,7 +49,7 @@ def predict_with_blanks(
         else:
             filled[name] = np.where(blank, value, column)
     if not open_names:
-        return predict_columns(filled, explosive, network)
+        return predict_columns(filled, explosive, network, evaluate)
     given = np.stack([~np.isnan(filled[name]) for name in open_names], axis=1)
     kinds, kind_of = np.unique(given, axis=0, return_inverse=True)
     parts = []
@@ -54,7 +57,7 @@ def predict_with_blanks(
         rows = np.flatnonzero(kind_of.ravel() == k)
         absent = {name for name, there in zip(open_names, kind, strict=True) if not there}
         part = {name: column[rows] for name, column in filled.items() if name not in absent}
-        parts.append(_Part(rows, predict_columns(part, explosive[rows], network)))
+        parts.append(_Part(rows, predict_columns(part, explosive[rows], network, evaluate)))
     return _joined(parts, count)
 
 

@@ -10,6 +10,7 @@ such inputs are marked. Imports NumPy and light modules only.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -31,14 +32,15 @@ from castblast.design.variables import INPUT_NAMES, VARIABLES
 from castblast.network import (
     Bounds,
     DomainViolation,
+    Evaluate,
     Network,
     RowPredictions,
     Shell,
+    answer_rows,
     domain_violations,
     evaluate_rows,
     explosive_index,
     keeps_ranges_and_rules,
-    predict_rows,
 )
 from castblast.specs.catalogue import resolve_explosive
 from castblast.types import BoolArray, FloatArray, IntArray
@@ -109,7 +111,10 @@ class ColumnPredictions(NamedTuple):
 
 
 def predict_columns(
-    values: InputColumns, explosive: NDArray[np.integer], network: Network
+    values: InputColumns,
+    explosive: NDArray[np.integer],
+    network: Shell,
+    evaluate: Evaluate | None = None,
 ) -> ColumnPredictions:
     """Predict columns of designs.
 
@@ -120,6 +125,8 @@ def predict_columns(
     explosive : (n,) int
         Positions in `network.explosives`.
     network : Network
+    evaluate : callable, optional
+        A model of another shape, of which `network` is the shell; asked for possible rows only.
 
     Returns
     -------
@@ -135,8 +142,14 @@ def predict_columns(
     index = np.asarray(explosive, dtype=np.int64)
     designs, full = _completed(values, len(index), network)
     numeric = np.stack(list(designs.inputs.values()), axis=1)
-    rows = predict_rows(network, numeric, index)
-    designs.faults.extend(_outgrown(network, numeric, index, rows, designs, full))
+    asked = _evaluator(network, evaluate)
+    if evaluate is None:
+        values_of_rows = asked(numeric, index)
+    else:
+        possible = ~_any_row(designs.faults, len(index))
+        values_of_rows = _some_rows(asked, numeric, index, possible, len(network.outputs))
+    rows = answer_rows(network, numeric, values_of_rows)
+    designs.faults.extend(_outgrown(network, numeric, index, rows, designs, full, asked))
     refused = _any_row(designs.faults, len(index))
     outside = ~keeps_ranges_and_rules(network, numeric)
     for entry in designs.unseen:
@@ -146,6 +159,26 @@ def predict_columns(
         rows = _without(rows, refused)
         domain = np.where(refused, "outside", domain)
     return ColumnPredictions(designs, rows, refused, domain)
+
+
+def _evaluator(network: Shell, evaluate: Evaluate | None) -> Evaluate:
+    """What computes values: the network itself, or the model that belongs to a shell."""
+    if evaluate is not None:
+        return evaluate
+    if not isinstance(network, Network):
+        message = "a shell without layers needs a model that computes its values"
+        raise TypeError(message)
+    return partial(evaluate_rows, network)
+
+
+def _some_rows(
+    evaluate: Evaluate, numeric: FloatArray, index: IntArray, rows: BoolArray, width: int
+) -> FloatArray:
+    """Values (n, width) of some rows, NaN in the others: libraries refuse odd numbers."""
+    values = np.full((len(numeric), width), np.nan)
+    if rows.any():
+        values[rows] = evaluate(numeric[rows], index[rows])
+    return values
 
 
 def explosive_position(network: Shell, text: str) -> int:
@@ -205,12 +238,13 @@ def _completed(
 
 @np.errstate(all="ignore")  # what is no number is refused by its bounds
 def _outgrown(
-    network: Network,
+    network: Shell,
     numeric: FloatArray,
     index: IntArray,
     rows: RowPredictions,
     designs: NetworkDesigns,
     full: Mapping[str, FloatArray],
+    evaluate: Evaluate,
 ) -> list[FaultyRows]:
     """Designs whose hole, as predicted, expands as wide as their burden or spacing.
 
@@ -226,12 +260,13 @@ def _outgrown(
     upper = np.array([column.upper for column in network.inputs])
     beyond = ~((numeric >= lower) & (numeric <= upper))
     narrow = breakout_width(full["spacing"], mean_burden(full)) < _FARTHEST * full["hole_diameter"]
-    moved = np.flatnonzero((beyond & bench).any(axis=1) & narrow)
+    possible = ~_any_row(designs.faults, len(index))
+    moved = np.flatnonzero((beyond & bench).any(axis=1) & narrow & possible)
     if len(moved):
         near = np.where(bench, np.clip(numeric[moved], lower, upper), numeric[moved])
-        answers = evaluate_rows(network, near, index[moved])
+        answers = evaluate(near, index[moved])
         radius[moved] = answers[:, network.output_names.index(_EXPANSION)]
-    known = narrow & ~(beyond & ~bench).any(axis=1) & ~_any_row(designs.faults, len(index))
+    known = narrow & ~(beyond & ~bench).any(axis=1) & possible
     for entry in designs.unseen:  # the answer is for another hole
         known &= ~entry.rows
     faults = expanded_hole_faults(full, np.where(known, radius, np.nan))

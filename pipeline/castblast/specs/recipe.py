@@ -364,7 +364,7 @@ class RecipeSource(NamedTuple):
     path: Path
 
 
-def load_recipe(path: Path, size: int | None = None) -> RecipeSource:
+def load_recipe(path: str | Path, size: int | None = None) -> RecipeSource:
     """Read a recipe, from a file or one that came with castblast, by name.
 
     `size` replaces the number of rows, in the kept text too.

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from castblast.api.training.fits import FIT_FILE
 from castblast.disk.files import tried, write_bytes, write_json
 from castblast.disk.reading import read_json
 from castblast.disk.resources import SHIPPED_NETWORKS, is_bare_name, resource
@@ -19,7 +20,6 @@ from castblast.network import Network
 from castblast.network.json_file import read_network
 from castblast.progress import ProgressCallback, silent
 from castblast.stages.outcome import Outcome
-from castblast.stages.training.fitting import FIT_FILE
 
 if TYPE_CHECKING:
     from castblast.export.parity import ParityReport
@@ -166,8 +166,7 @@ def _export_module(
     source: Path, wanted: Sequence[str], verify: bool, progress: ProgressCallback
 ) -> tuple[dict[str, dict[str, bytes]], dict[str, ParityReport]]:
     """Files and reports of a fit that is no chain of dense layers."""
-    from castblast.export.onnx.file import wrap_onnx
-    from castblast.export.parity import check_wrapped_parity
+    from castblast.api.exports import module_onnx
     from castblast.surrogate.fitting.estimators import bare_model, is_torch_model
     from castblast.surrogate.fitting.fit_store import open_fit
 
@@ -189,27 +188,8 @@ def _export_module(
             f"not {', '.join(others)} (--to onnx)"
         )
         raise SpecError(message)
-    from castblast.surrogate.torch_onnx import torch_core
-
-    progress(0.0, f"tracing {name}")
-    shell = fit.shell()
-    try:
-        content = wrap_onnx(shell, torch_core(fit))
-    except SpecError as fault:
-        lines = [line.removeprefix(f"{name}: ") for line in str(fault).splitlines()]
-        raise SpecError("\n".join(f"{name}: {line}" for line in lines)) from fault
-    contents = {"onnx": {"model.onnx": content}}
-    if not verify:
-        return contents, {}
-    progress(0.5, "running onnx")
-    try:
-        report = check_wrapped_parity(shell, content)
-    except CheckError as fault:
-        message = f"onnx: {fault}"
-        raise CheckError(message) from fault
-    if report.faults:
-        raise CheckError("\n".join(f"onnx: {line}" for line in report.faults))
-    return contents, {"onnx": report}
+    content, report = module_onnx(fit, verify=verify, progress=progress)
+    return {"onnx": {"model.onnx": content}}, {} if report is None else {"onnx": report}
 
 
 def _targets(targets: Sequence[str]) -> list[str]:
@@ -243,19 +223,15 @@ def _verify(
     network: Network, contents: Mapping[str, dict[str, bytes]], progress: ProgressCallback
 ) -> dict[str, ParityReport]:
     """Run every target on the golden rows; all disagreements at once."""
-    from castblast.export.parity import check_parity
+    from castblast.export.parity import verify
 
     reports, faults = {}, []
     for number, (target, files) in enumerate(contents.items()):
         progress(number / len(contents), f"running {target}")
         try:
-            report = check_parity(network, target, files)
+            reports[target] = verify(network, target, files)
         except CheckError as fault:
-            faults.append(f"{target}: {fault}")
-            continue
-        reports[target] = report
-        if report.verified:
-            faults += [f"{target}: {line}" for line in report.faults]
+            faults.append(str(fault))
     if faults:
         raise CheckError("\n".join(faults))
     return reports

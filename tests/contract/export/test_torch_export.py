@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from castblast.api.training.fits import FIT_FILE
 from castblast.disk.files import write_json
 from castblast.errors import CheckError, SpecError
 from castblast.export.onnx.file import run_onnx, run_onnx_rows, wrap_onnx
@@ -19,7 +20,6 @@ from castblast.export.parity import TOLERANCE, check_wrapped_parity
 from castblast.network import in_domain, offending_inputs, predict_rows
 from castblast.specs.models.model import PAPER_FEATURES, PAPER_TARGETS, read_model_spec
 from castblast.stages.export import export
-from castblast.stages.training.fitting import FIT_FILE
 from castblast.surrogate.fitting import estimators
 from castblast.surrogate.fitting.features import Table, read_table
 from castblast.surrogate.fitting.fit_store import fit_key, save_kept

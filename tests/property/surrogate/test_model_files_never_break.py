@@ -9,9 +9,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from castblast.api.training.fits import kept_fits
 from castblast.errors import CastblastError
 from castblast.specs.models.model import make_model_spec, refuse_code
-from castblast.stages.training.fitting import kept_fits
 from castblast.surrogate.searching.study_file import hold_study
 
 BOUNDED = settings(

@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from castblast.api.training.judging import DEMO
 from castblast.design.variables import STEMMING_RATIO
 from castblast.errors import DatasetError, SpecError
 from castblast.prediction.answer import predict
-from castblast.stages.comparison.run import DEMO, compare
+from castblast.stages.comparison.run import compare
 from castblast.stages.export import export
 from castblast.stages.outcome import Outcome
 from castblast.stages.predict import predict_design

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from castblast.api.training.judging import DEMO
 from castblast.cli import main
 from castblast.errors import SimulationError
 from castblast.jobs import Job, run_jobs
-from castblast.stages.comparison.run import DEMO, compare
+from castblast.stages.comparison.run import compare
 from castblast.stages.training.runs import list_runs
 from castblast.stages.training.train import train
 from castblast.surrogate.fitting import kept, training

@@ -133,7 +133,7 @@ def compare(
 
     What is fitted already is not fitted again, so a comparison that was stopped goes on.
     """
-    from castblast.stages.comparison.run import FULL, QUICK
+    from castblast.api.training.judging import FULL, QUICK
     from castblast.stages.comparison.run import compare as run
 
     with screen.progress("compare") as progress:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from castblast.dataset.building.build import build_shards
 from castblast.dataset.building.extend import Existing, read_existing
 from castblast.dataset.building.final import Rows, write_final
+from castblast.dataset.building.produce import already_built, finish, output_path
 from castblast.dataset.building.work import Work
 from castblast.dataset.building.workplace import is_finished, open_work_folder, sole_builder
 from castblast.dataset.file.failures import require_success, summary
@@ -22,12 +23,7 @@ from castblast.dataset.rows.simulation import Simulator, blast_simulator
 from castblast.errors import SpecError
 from castblast.progress import ProgressCallback, silent
 from castblast.specs.recipe import Recipe
-from castblast.stages.datasets.generate import (
-    GenerateOutcome,
-    already_finished,
-    finish,
-    output_path,
-)
+from castblast.stages.datasets.generate import GenerateOutcome, generated
 from castblast.types import FloatArray
 
 
@@ -55,20 +51,21 @@ class _NewRows:
         )
 
 
-def _new_rows(existing: Existing, add: int | Path) -> _NewRows:
+def _new_rows(existing: Existing, add: int | str | Path) -> _NewRows:
     parents = existing.as_parents
     if isinstance(add, int):
         return _NewRows(add, parents)
     names = tuple(entry.name for entry in existing.explosives)
+    add = Path(add)
     chosen = read_design_file(add, existing.source.recipe, names)
     own = parents[-1]._replace(design_sha256=rows_sha256(*chosen))
     return _NewRows(len(chosen[1]), (*parents[:-1], own), add, chosen)
 
 
 def extend(
-    dataset: Path,
-    add: int | Path,
-    out: Path | None = None,
+    dataset: str | Path,
+    add: int | str | Path,
+    out: str | Path | None = None,
     *,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -101,7 +98,7 @@ def extend(
     SimulationError
         More failed samples than the recipe allows; the shards are kept.
     """
-    existing = read_existing(dataset, lambda _, line: progress(0.0, line))
+    existing = read_existing(Path(dataset), lambda _, line: progress(0.0, line))
     simulator = blast_simulator(
         existing.source.recipe, tuple(entry.spec.to_explosive() for entry in existing.explosives)
     )
@@ -120,8 +117,8 @@ def extend(
 def produce_extension(
     existing: Existing,
     simulator: Simulator,
-    add: int | Path,
-    out: Path | None = None,
+    add: int | str | Path,
+    out: str | Path | None = None,
     *,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -139,7 +136,7 @@ def produce_extension(
     origin = made_from(recipe, existing.explosives, parents)
     with sole_builder(path):
         if not restart and is_finished(path, origin):
-            return already_finished(path)
+            return generated(already_built(path))
         new = new_rows.design(existing, recipe, simulator)
         folder = open_work_folder(path, origin, restart=restart).resolve()
         work = Work(new, simulator, rows_hash(origin), folder, recipe.shard_size)
@@ -155,4 +152,4 @@ def produce_extension(
             path, folder, source, existing.explosives, rows, parents=parents, progress=progress
         )
         lines += [f"{parents[-1].size} rows of {parents[-1].id} taken over", summary(rows.status)]
-        return finish(path, content, lines)
+        return generated(finish(path, content, lines))

@@ -91,7 +91,8 @@ def _make_dataset(demo: Demo, progress: ProgressCallback) -> list[str]:
 
 
 def _train(demo: Demo, progress: ProgressCallback) -> list[str]:
-    from castblast.stages.comparison.run import DEMO, compare
+    from castblast.api.training.judging import DEMO
+    from castblast.stages.comparison.run import compare
 
     folder = demo.out / "models"
     specs = [resource(f"models/specs/{name}.yaml") for name in MODELS]

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import floor
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from castblast.disk.resources import resource
-from castblast.progress import ProgressCallback, silent
-from castblast.stages.outcome import Outcome
-from castblast.stages.training.fitting import (
+from castblast.api.training.fits import (
     fit_all,
     fit_files,
     note_dataset,
-    read_rows,
     require_training,
 )
+from castblast.disk.resources import resource
+from castblast.progress import ProgressCallback, silent
+from castblast.stages.outcome import Outcome
+from castblast.surrogate.fitting.metrics import show_r_squared, show_share
 
 if TYPE_CHECKING:
     from castblast.surrogate.fitting.training import Fit
@@ -70,6 +69,7 @@ def train(
     require_training("castblast train", chosen, tracking=tracking)
     from castblast.dataset.file.store import open_dataset
     from castblast.disk.files import require_writable
+    from castblast.surrogate.fitting.rows import read_rows
 
     table = read_rows(open_dataset(dataset), chosen, dataset)
     out = dataset.parent / "fits" if out is None else out
@@ -107,13 +107,3 @@ def _outcome(fits: Sequence[Fit], out: Path) -> Outcome:
     }
     lines = [f"wrote {out}", f"next: castblast compare, which ranks what lies in {out}"]
     return Outcome(document=document, title=title, header=header, rows=rows, lines=lines)
-
-
-def show_r_squared(value: float | None) -> str:
-    """R² cut, not rounded, to five places: a model that misses is never shown as 1."""
-    return "-" if value is None else f"{floor(value * 1e5) / 1e5:.5f}"
-
-
-def show_share(value: float | None) -> str:
-    """A fraction in percent."""
-    return "-" if value is None else f"{value:.2%}"

@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from castblast.api.training.fits import require_training
 from castblast.disk.files import write_json, write_text
 from castblast.progress import ProgressCallback, silent
 from castblast.stages.outcome import Outcome
-from castblast.stages.training.fitting import read_rows, require_training
-from castblast.stages.training.train import RUNS_FOLDER, show_share
+from castblast.stages.training.train import RUNS_FOLDER
+from castblast.surrogate.fitting.metrics import show_share
 
 if TYPE_CHECKING:
     from castblast.specs.models.model import ModelSpec
@@ -73,6 +74,7 @@ def tune(
     require_training("castblast tune", [wanted], "tune", tracking=tracking)
     from castblast.dataset.file.store import open_dataset
     from castblast.disk.files import require_writable
+    from castblast.surrogate.fitting.rows import read_rows
     from castblast.surrogate.searching import tuning
 
     tuning.check_study(wanted, trials, timeout)

@@ -7,6 +7,7 @@ truth; the same two figures are given for every target and explosive here.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import floor
 from typing import NamedTuple
 
 import numpy as np
@@ -102,3 +103,13 @@ def summary_error(scores: dict[str, Score]) -> float:
     errors = np.array([entry.relative_error_95 for entry in scores.values()])
     with np.errstate(divide="ignore"):
         return float(np.exp(np.mean(np.log(errors))))
+
+
+def show_r_squared(value: float | None) -> str:
+    """R² cut, not rounded, to five places: a model that misses is never shown as 1."""
+    return "-" if value is None else f"{floor(value * 1e5) / 1e5:.5f}"
+
+
+def show_share(value: float | None) -> str:
+    """A fraction in percent."""
+    return "-" if value is None else f"{value:.2%}"

@@ -11,7 +11,6 @@ import pytest
 from castblast.errors import DatasetError, SpecError, Status
 from castblast.specs.models.model import PAPER_FEATURES, PAPER_TARGETS, MlpSpec, RidgeSpec
 from castblast.specs.recipe import SPLIT_NAMES
-from castblast.stages.training.fitting import read_rows
 from castblast.surrogate.fitting.column_checks import check_positive
 from castblast.surrogate.fitting.features import (
     SPLITS,
@@ -20,6 +19,7 @@ from castblast.surrogate.fitting.features import (
     input_columns,
     read_table,
 )
+from castblast.surrogate.fitting.rows import read_rows
 from castblast.surrogate.fitting.training import fit_spec
 
 

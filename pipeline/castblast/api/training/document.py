@@ -6,18 +6,16 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from castblast.api.training.fits import fit_title, held_out
+from castblast.api.training.page import write_costs, write_page
 from castblast.disk.files import write_csv, write_json, write_text
-from castblast.names import as_words
-from castblast.stages.comparison.page import write_costs, write_page
-from castblast.stages.outcome import Outcome
-from castblast.stages.training.fitting import fit_title, held_out
-from castblast.stages.training.train import show_r_squared, show_share
 
 if TYPE_CHECKING:
-    from castblast.stages.comparison.found import Comparison
+    from castblast.api.training.found import Comparison
     from castblast.surrogate.fitting.training import Fit
 
-_HEADLINE = "burden_velocity"
+#: Target shown first, where it is there.
+HEADLINE = "burden_velocity"
 
 
 def write_comparison(
@@ -38,10 +36,7 @@ def write_comparison(
     from castblast.surrogate.judging.timing import timings
 
     files = [write_json(out / "comparison.json", document)]
-    for fit in found.fits:
-        if fit.spec.name in found.curves:
-            files += _write_curve(out / fit.spec.name, fit, found.curves[fit.spec.name])
-    files += _draw(out, found, document)
+    files += draw_comparison(out, found, document)
     network = out / "network.json"
     if found.league["chosen"] and found.chosen.network is not None:
         files.append(write_text(network, to_json(found.chosen.network)))
@@ -53,6 +48,15 @@ def write_comparison(
     times = {"models": costs, "parts": dict(found.times), "comparison_seconds": seconds}
     files.append(write_json(out / "timings.json", times))
     return files
+
+
+def draw_comparison(out: Path, found: Comparison, document: Mapping[str, Any]) -> list[Path]:
+    """Write learning curves and pictures into a folder."""
+    files = []
+    for fit in found.fits:
+        if fit.spec.name in found.curves:
+            files += _write_curve(out / fit.spec.name, fit, found.curves[fit.spec.name])
+    return [*files, *_draw(out, found, document)]
 
 
 def comparison_document(found: Comparison) -> dict[str, Any]:
@@ -107,7 +111,7 @@ def _write_curve(folder: Path, fit: Fit, curve: Sequence[Any]) -> list[Path]:
         columns[f"{name}_test_relative_error_95"] = test
         columns[f"{name}_test_r2"] = [point.test[name].r2 for point in curve]
         lines.append(LearningLine(name, sizes, train, test))
-    headline = _HEADLINE if _HEADLINE in fit.table.target_names else fit.table.target_names[0]
+    headline = HEADLINE if HEADLINE in fit.table.target_names else fit.table.target_names[0]
     picture = draw_figure_two(
         folder / "figure_2.png",
         fit_title(fit),
@@ -132,7 +136,7 @@ def _draw(out: Path, found: Comparison, document: Mapping[str, Any]) -> list[Pat
         draw_strata(out / "strata.png", f"{name}: error by input", document["strata"]),
     ]
     targets = found.chosen.table.target_names
-    headline = _HEADLINE if _HEADLINE in targets else targets[0]
+    headline = HEADLINE if HEADLINE in targets else targets[0]
     maps = error_maps(found.chosen, headline)
     if maps:
         title = f"{name}: where {headline.replace('_', ' ')} errs"
@@ -149,63 +153,3 @@ def _draw(out: Path, found: Comparison, document: Mapping[str, Any]) -> list[Pat
         law = draw_learning_laws(out / "learning_law.png", title, document["learning"][name])
         files.append(law)
     return files
-
-
-def outcome(found: Comparison, document: Mapping[str, Any], out: Path) -> Outcome:
-    """Give what the screen shows of a comparison."""
-    league = found.league
-    paper = league["paper"]
-    first = _HEADLINE if _HEADLINE in league["targets"] else league["targets"][0]
-    others = [name for name in league["targets"] if name != first]
-    shown = [as_words(name) for name in (first, *others)]
-    header = ["model", "gate", "export", f"{shown[0]}: R²", *(f"{name}: 95 %" for name in shown)]
-    rows = []
-    for entry in league["league"]:
-        mark = " *" if entry["name"] == league["chosen"] else ""
-        gate = {True: "passed", False: "failed", None: "-"}[entry["gate_passed"]]
-        figures = entry["targets"]
-        rows.append(
-            [
-                entry["name"] + mark,
-                gate,
-                "yes" if entry["exportable"] else "no",
-                show_r_squared(figures[first]["r2"]),
-                *(show_share(figures[name]["relative_error_95"]) for name in (first, *others)),
-            ]
-        )
-    if paper["target"] == first:
-        figures = [f"{paper['r2']:.4f}", f"{paper['relative_error_95']:.1%}"]
-        rows.append([f"paper, {paper['runs']:,} runs", "", "", *figures, *("" for _ in others)])
-    title = f"{league['test_rows']:,} test rows never trained on"
-    return Outcome(
-        document={**document, "out": str(out)},
-        title=title,
-        header=header,
-        rows=rows,
-        lines=_lines(found, out),
-        ok=league["chosen"] is not None,
-    )
-
-
-def _lines(found: Comparison, out: Path) -> list[str]:
-    league = found.league
-    if league["chosen"] is None:
-        lines = ["no model that can be exported passes the physics gate: none is chosen"]
-        first = league["best_exportable"]
-        reasons = found.gates[first]["reasons"]
-        lines += [f"{first}: {reason}" for reason in reasons[:3]]
-    else:
-        lines = [f"* chosen: {league['rule']}"]
-    if league["gap"] > 1.0:
-        lines.append(
-            f"its validation error is {league['gap']:.2f} times that of the best overall, "
-            f"{league['best_overall']}"
-        )
-    for name, curve in found.curves.items():
-        rows = paper_met_from(curve, league["paper"])
-        lines.append(
-            f"{name}: the published figures are not met with {curve[-1].rows:,} training rows"
-            if rows is None
-            else f"{name}: the published figures are met from {rows:,} training rows on"
-        )
-    return [*lines, *found.remarks, f"wrote {out / 'report.html'}"]

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 #: Folders of the package that no part of a comparison uses.
-_NO_PART = ("muckpile", "scene", "prediction", "report", "export", "stages", "cli")
+_NO_PART = ("muckpile", "scene", "prediction", "report", "export", "api", "stages", "cli")
 
 
 @dataclass(frozen=True)

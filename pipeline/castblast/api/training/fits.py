@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from castblast.disk.files import write_csv, write_json, write_text
 from castblast.disk.plain import json_text
 from castblast.disk.reading import read_json, read_text
-from castblast.errors import DatasetError, SpecError
+from castblast.errors import SpecError
 from castblast.extras import missing_libraries, missing_line, require
 from castblast.jobs import Job, available_cores, run_jobs
 from castblast.progress import ProgressCallback, part, silent
@@ -31,33 +31,6 @@ FIT_FILE = "fit.json"
 _DATASET = "dataset.txt"
 #: Extras without which nothing is fitted, scored and drawn.
 _ALWAYS = ("data", "simulate", "train", "plot")
-
-
-def read_rows(dataset: Any, specs: Sequence[ModelSpec], path: Path) -> Table:
-    """Read every column that one of the specs asks for.
-
-    Raises
-    ------
-    DatasetError
-        As `read_table`, with the path in front of every line.
-    SpecError
-        Features or targets that have one value in every row; all specs at once.
-    """
-    from castblast.surrogate.fitting.column_checks import constant_faults
-    from castblast.surrogate.fitting.features import read_table
-
-    features = dict.fromkeys(name for spec in specs for name in spec.features)
-    targets = dict.fromkeys(name for spec in specs for name in spec.targets)
-    try:
-        table = read_table(dataset, tuple(features), tuple(targets))
-    except DatasetError as fault:
-        lines = "\n".join(f"{path}: {line}" for line in str(fault).splitlines())
-        raise DatasetError(lines) from None
-    named = [spec.resolved(table.varying or table.feature_names) for spec in specs]
-    faults = [line for spec in named for line in constant_faults(spec, table)]
-    if faults:
-        raise SpecError("\n".join(faults))
-    return table
 
 
 def require_training(

@@ -9,7 +9,7 @@ from typing import Any
 from castblast.design.variables import VARIABLES
 from castblast.names import as_words
 from castblast.report.html import Picture, Section, Table, write_report
-from castblast.stages.training.train import show_r_squared, show_share
+from castblast.surrogate.fitting.metrics import show_r_squared, show_share
 from castblast.version import __version__
 
 Document = Mapping[str, Any]

@@ -1,0 +1,1 @@
+"""Fits and comparisons of models: made, kept in a folder, judged, described."""
