@@ -23,6 +23,7 @@ from castblast.explosive.isentrope import Explosive
 from castblast.extras import require
 from castblast.specs.case import require_none
 from castblast.specs.explosive import load_explosive, require_consistent
+from castblast.specs.loading import parse_yaml
 from castblast.specs.recipe import RecipeSource, load_recipe
 from castblast.stopping import interruptible
 from castblast.types import FloatArray, IntArray
@@ -157,8 +158,6 @@ def resized(source: RecipeSource, seed: int | None) -> RecipeSource:
         message = f"seed: {seed}: a whole number from 0 is needed"
         raise SpecError(message, field="seed", value=seed, allowed="0 to 2**63 - 1")
     import yaml
-
-    from castblast.specs.loading import parse_yaml
 
     content = {**parse_yaml(source.text, str(source.path)), "seed": int(seed)}
     text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True)

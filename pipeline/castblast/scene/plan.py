@@ -13,6 +13,7 @@ from castblast.design.rule import complete_columns
 from castblast.errors import SpecError
 from castblast.muckpile.bench.geometry import Bench, assign_blocks, block_centres, block_velocities
 from castblast.muckpile.bench.timing import firing_front_azimuth, nearest_holes, scatter_delays
+from castblast.prediction.answer import predict
 from castblast.specs.bench.bench import BenchSpec
 from castblast.specs.bench.holes import Holes, blocks_of_holes, read_holes
 from castblast.specs.explosive import load_explosive
@@ -162,8 +163,6 @@ def _common_speed(spec: BenchSpec) -> tuple[float, dict[str, Any] | None]:
 
 
 def _predict(design: Mapping[str, Any]) -> dict[str, Any]:
-    from castblast.prediction.answer import predict
-
     return predict(_inputs(design), design["explosive"])
 
 

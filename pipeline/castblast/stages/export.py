@@ -15,11 +15,14 @@ from castblast.disk.files import tried, write_bytes, write_json
 from castblast.disk.reading import read_json
 from castblast.disk.resources import SHIPPED_NETWORKS, is_bare_name, resource
 from castblast.errors import CheckError, SpecError, nearest_name
+from castblast.export.parity import verify
+from castblast.export.targets import TARGETS
 from castblast.extras import require
 from castblast.network import Network
 from castblast.network.json_file import read_network
 from castblast.progress import ProgressCallback, silent
 from castblast.stages.outcome import Outcome
+from castblast.stages.web import build_page
 
 if TYPE_CHECKING:
     from castblast.export.parity import ParityReport
@@ -107,9 +110,6 @@ def _write(
     network: Network, wanted: Sequence[str], source: Path, histories: Path | None
 ) -> dict[str, dict[str, bytes]]:
     """Files of every target, all faults at once."""
-    from castblast.export.targets import TARGETS
-    from castblast.stages.web import build_page
-
     contents, faults = {}, []
     for target in wanted:
         try:
@@ -223,8 +223,6 @@ def _verify(
     network: Network, contents: Mapping[str, dict[str, bytes]], progress: ProgressCallback
 ) -> dict[str, ParityReport]:
     """Run every target on the golden rows; all disagreements at once."""
-    from castblast.export.parity import verify
-
     reports, faults = {}, []
     for number, (target, files) in enumerate(contents.items()):
         progress(number / len(contents), f"running {target}")

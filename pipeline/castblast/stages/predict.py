@@ -14,6 +14,7 @@ from castblast.design.variables import VARIABLES
 from castblast.names import as_words
 from castblast.network import Network
 from castblast.prediction.answer import load_network, predict
+from castblast.specs.case import parse_values
 from castblast.stages.outcome import Outcome
 
 
@@ -21,8 +22,6 @@ def predict_design(
     values: Mapping[str, Any], explosive: str, network: Path | None = None
 ) -> Outcome:
     """Predict one design written with units, such as ``{"burden": "3 m"}``; see `predict`."""
-    from castblast.specs.case import parse_values
-
     model = load_network(network)
     document = predict(parse_values(values, "predict"), explosive, model)
     rows = [_row(model, name, document) for name in model.output_names]

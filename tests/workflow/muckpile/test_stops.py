@@ -18,6 +18,7 @@ import yaml
 
 from castblast.disk.locks import LOCK_NAME, LockedError, only_writer
 from castblast.errors import OutputError
+from castblast.stages.muckpile import compare
 from castblast.stages.muckpile import run as muckpile
 from castblast.stages.muckpile.compare import run_seeds
 from castblast.stages.muckpile.run import run_muckpile
@@ -152,7 +153,7 @@ def test_results_stay_whole_when_writing_fails(
     def fail(*_: Any) -> None:
         raise fault
 
-    monkeypatch.setattr("castblast.report.piles.muckpile_figures.draw_energy", fail)
+    monkeypatch.setattr("castblast.stages.muckpile.results.draw_energy", fail)
     with pytest.raises(type(fault)):
         run_muckpile(bench, out, velocity="8 m/s", packings=packings)
     after = contents(out)
@@ -238,11 +239,11 @@ def test_seeds_that_are_finished_are_not_run_again(
         ran.append(seed)
         return run(*arguments, seed=seed, **options)
 
-    monkeypatch.setattr(muckpile, "run_muckpile", stopped)
+    monkeypatch.setattr(compare, "run_muckpile", stopped)
     with pytest.raises(KeyboardInterrupt):
         run_seeds(bench, out, 2)
     monkeypatch.setattr(
-        muckpile,
+        compare,
         "run_muckpile",
         lambda *a, seed, **o: (ran.append(seed), run(*a, seed=seed, **o))[1],
     )

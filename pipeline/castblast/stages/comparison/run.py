@@ -23,9 +23,11 @@ from castblast.api.training.fits import (
 )
 from castblast.api.training.found import Extent
 from castblast.api.training.judging import FULL, judge
+from castblast.disk.files import require_writable
 from castblast.disk.resources import resource
 from castblast.errors import SpecError
 from castblast.progress import ProgressCallback, part, silent
+from castblast.specs.models.model import read_model_specs, refuse_code
 from castblast.stages.outcome import Outcome
 from castblast.stages.training.train import RUNS_FOLDER
 
@@ -80,8 +82,6 @@ def compare(
     DatasetError
         An unusable dataset.
     """
-    from castblast.specs.models.model import refuse_code
-
     started = time.perf_counter()
     dataset, wanted, fits = _sources(dataset, specs, fits, extent)
     refuse_code(wanted, allowed=allow_code)
@@ -90,7 +90,6 @@ def compare(
     wanted = without_missing(wanted, remarks)
     from castblast.api.training.document import comparison_document, write_comparison
     from castblast.dataset.file.store import open_dataset
-    from castblast.disk.files import require_writable
     from castblast.stages.comparison.shown import outcome
     from castblast.surrogate.fitting.rows import read_rows
 
@@ -132,8 +131,6 @@ def _sources(
 
 def _read_specs(given: Sequence[Path]) -> list[ModelSpec]:
     """Read specs from files and folders; none given: the shipped ones."""
-    from castblast.specs.models.model import read_model_specs
-
     paths: list[Path] = []
     for path in given or [resource("models/specs")]:
         inside = sorted(path.glob("*.yaml")) if path.is_dir() else [path]

@@ -16,10 +16,14 @@ from castblast.disk.resources import is_bare_name
 from castblast.errors import SpecError
 from castblast.names import as_words
 from castblast.network import Network, explosive_index, member_spread
+from castblast.network.json_file import read_network
 from castblast.progress import ProgressCallback, part, silent
 from castblast.specs.models.model import ModelSpec, make_model_spec, read_model_spec, refuse_code
 from castblast.specs.recipe import Recipe
+from castblast.stages.export import find_network
 from castblast.stages.outcome import Outcome
+from castblast.surrogate.fitting.features import read_table
+from castblast.surrogate.searching.ensemble import ensemble_spread, fit_members
 from castblast.surrogate.searching.infill import POOL_FACTOR, choose_batch, infill_worth
 from castblast.types import FloatArray
 
@@ -122,9 +126,6 @@ def _spread(
         return found.output_names, member_spread(found, numeric, index)
     import pandas as pd
 
-    from castblast.surrogate.fitting.features import read_table
-    from castblast.surrogate.searching.ensemble import ensemble_spread, fit_members
-
     with reading_dataset(existing.path) as dataset:
         table = read_table(dataset, found.features, found.targets)
     fits = fit_members(found, table, members, progress)
@@ -134,9 +135,6 @@ def _spread(
 
 def _find_model(model: Path) -> Network | ModelSpec:
     """Give the network of a fit if it has members, else the spec to fit members from."""
-    from castblast.network.json_file import read_network
-    from castblast.stages.export import find_network
-
     if model.suffix in (".yaml", ".yml") or (is_bare_name(model) and not model.is_dir()):
         return read_model_spec(model)
     path = find_network(model)

@@ -19,6 +19,14 @@ from castblast.extras import is_installed
 from castblast.progress import ProgressCallback
 from castblast.disk.resources import resource
 from castblast.disk.note import read_note, write_note
+from castblast.api.training.judging import DEMO
+from castblast.specs.bench.bench import load_bench
+from castblast.stages.comparison.run import compare
+from castblast.stages.datasets.generate import generate
+from castblast.stages.demo.prediction import compare_with_physics
+from castblast.stages.demo.report import write_demo_report
+from castblast.stages.export import export
+from castblast.stages.muckpile.run import run_muckpile
 
 RECIPE = "data_specs/recipes/quickstart.yaml"
 BENCH = "data_specs/benches/demo.yaml"
@@ -79,8 +87,6 @@ def make_demo(
 
 
 def _make_dataset(demo: Demo, progress: ProgressCallback) -> list[str]:
-    from castblast.stages.datasets.generate import generate
-
     make = partial(generate, demo.recipe, demo.dataset, workers=demo.workers, progress=progress)
     try:
         outcome = make(restart=demo.restart)
@@ -91,9 +97,6 @@ def _make_dataset(demo: Demo, progress: ProgressCallback) -> list[str]:
 
 
 def _train(demo: Demo, progress: ProgressCallback) -> list[str]:
-    from castblast.api.training.judging import DEMO
-    from castblast.stages.comparison.run import compare
-
     folder = demo.out / "models"
     specs = [resource(f"models/specs/{name}.yaml") for name in MODELS]
     key = make_key(dataset=demo.dataset, **{spec.stem: spec for spec in specs})
@@ -121,8 +124,6 @@ def _league_line(row: Sequence[str]) -> str:
 
 
 def _export(demo: Demo, progress: ProgressCallback) -> list[str]:
-    from castblast.stages.export import export
-
     progress(0.0, "writing and verifying")
     targets = ("json", "onnx", "web")
     return export(
@@ -131,8 +132,6 @@ def _export(demo: Demo, progress: ProgressCallback) -> list[str]:
 
 
 def _predict(demo: Demo, progress: ProgressCallback) -> list[str]:
-    from castblast.stages.demo.prediction import compare_with_physics
-
     folder = demo.out / "prediction"
     key = make_key(network=demo.network)
     if not demo.restart and read_note(folder) == key:
@@ -143,9 +142,6 @@ def _predict(demo: Demo, progress: ProgressCallback) -> list[str]:
 
 
 def _throw(demo: Demo, progress: ProgressCallback) -> list[str]:
-    from castblast.specs.bench.bench import load_bench
-    from castblast.stages.muckpile.run import run_muckpile
-
     folder = demo.out / "muckpile"
     answers = json.loads((demo.out / "prediction" / "comparison.json").read_text(encoding="utf-8"))
     velocity = f"{answers['predicted']['burden_velocity']:.6g} m/s"
@@ -163,8 +159,6 @@ def _throw(demo: Demo, progress: ProgressCallback) -> list[str]:
 
 
 def _report(demo: Demo, progress: ProgressCallback) -> list[str]:
-    from castblast.stages.demo.report import write_demo_report
-
     progress(0.0, "writing the report")
     return [f"wrote {write_demo_report(demo.out)}"]
 

@@ -14,15 +14,18 @@ from castblast.disk.files import require_writable, tried, write_json, written_to
 from castblast.disk.locks import LOCK_NAME, only_writer
 from castblast.disk.note import forget_note, read_note, write_note
 from castblast.disk.plain import as_plain
+from castblast.disk.resources import find_spec
 from castblast.errors import SpecError
 from castblast.identity import make_key
 from castblast.muckpile.results.metrics import UNITS, Band, band
 from castblast.muckpile.results.profile import Profile
 from castblast.names import as_words
 from castblast.progress import ProgressCallback, silent
-from castblast.specs.bench.bench import BenchSpec
+from castblast.report.piles.movement_figures import draw_profiles
+from castblast.specs.bench.bench import BenchSpec, load_bench
 from castblast.stages.muckpile.read import FinishedRun, numbers, read_runs
 from castblast.stages.muckpile.results import HEADER, bench_content
+from castblast.stages.muckpile.run import run_muckpile
 from castblast.stages.outcome import Outcome
 
 _PER_BLOCK = ("block_throw", "block_spread")
@@ -117,10 +120,6 @@ def run_seeds(
         At least 2.
     progress : callback
     """
-    from castblast.disk.resources import find_spec
-    from castblast.specs.bench.bench import load_bench
-    from castblast.stages.muckpile.run import run_muckpile
-
     spec = load_bench(bench)
     folder = Path("runs") / spec.name if out is None else out
     first = options.pop("seed", None)
@@ -187,8 +186,6 @@ def _names(folders: Sequence[Path]) -> list[str]:
 
 
 def _draw(path: Path, runs: Sequence[FinishedRun], names: Sequence[str]) -> Path:
-    from castblast.report.piles.movement_figures import draw_profiles
-
     profiles = [run.pile for run in runs]
     widest = max(runs, key=lambda run: float(run.ground.x[-1]))
     low = max(float(profile.x[0]) for profile in profiles)

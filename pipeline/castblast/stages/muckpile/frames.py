@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +13,8 @@ from castblast.errors import SpecError
 from castblast.muckpile.balls.particles import Particles
 from castblast.muckpile.bench.geometry import Bench
 from castblast.muckpile.cast.case import CastCase
-
-if TYPE_CHECKING:
-    from castblast.report.piles.animation import Animation
-    from castblast.report.piles.vtk_files import VtkSeries
+from castblast.report.piles.animation import Animation, need_format
+from castblast.report.piles.vtk_files import VtkSeries, need_vtk, write_vtkhdf
 
 #: Simulated time [s] between two states by default.
 FRAME_INTERVAL = 0.1
@@ -34,13 +32,9 @@ def check_frames(animation: str | None, *, vtk: bool, vtkhdf: bool) -> None:
         Unknown format, mp4 without ffmpeg, or VTK missing.
     """
     if animation is not None:
-        from castblast.report.piles.animation import need_format
-
         need_format(animation)
     for option, wanted in (("--vtk", vtk), ("--vtkhdf", vtkhdf)):
         if wanted:
-            from castblast.report.piles.vtk_files import need_vtk
-
             need_vtk(option)
 
 
@@ -78,12 +72,8 @@ class Frames:
         self._series: VtkSeries | None = None
         folder.mkdir(parents=True, exist_ok=True)
         if animation:
-            from castblast.report.piles.animation import Animation
-
             self._film = Animation(folder, case.particles, bench, case.walls)
         if vtk or vtkhdf:
-            from castblast.report.piles.vtk_files import VtkSeries
-
             self._series = VtkSeries(folder / (_FOLDER if vtk else _HIDDEN))
 
     def __bool__(self) -> bool:
@@ -138,8 +128,6 @@ class Frames:
             if self._vtk:
                 files.append(self._series.close())
             if self._vtkhdf:
-                from castblast.report.piles.vtk_files import write_vtkhdf
-
                 files.append(write_vtkhdf(self._folder / "balls.vtkhdf", self._series))
         if self._film is not None:
             if self._film.times:

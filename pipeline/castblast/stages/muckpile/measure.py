@@ -21,6 +21,8 @@ from castblast.muckpile.results.metrics import pile_metrics
 from castblast.muckpile.results.movement import group_movement
 from castblast.muckpile.results.ore import move_ore
 from castblast.muckpile.results.profile import HeightField, Profile, mean_profile
+from castblast.report.piles.movement_figures import draw_movement, draw_ore, draw_profiles
+from castblast.report.piles.muckpile_figures import draw_plan, draw_section
 from castblast.scene.plan import Plan, make_plan
 from castblast.specs.bench.balls.files import read_balls
 from castblast.specs.bench.bench import BenchSpec, load_bench
@@ -251,9 +253,6 @@ def _write(folder: Path, found: _Measured, document: Mapping[str, Any]) -> Seque
 
 
 def _draw(folder: Path, found: _Measured) -> list[Path]:
-    from castblast.report.piles.movement_figures import draw_movement, draw_ore, draw_profiles
-    from castblast.report.piles.muckpile_figures import draw_plan, draw_section
-
     before, after, bench, walls = found.case.particles, found.after, found.bench, found.case.walls
     mean, y = mean_profile(found.surface), middle_section(before, bench)
     files = [

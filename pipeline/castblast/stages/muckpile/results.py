@@ -16,6 +16,14 @@ from castblast.identity import digest, file_hash
 from castblast.muckpile.cast.solver import CastCase, CastResult
 from castblast.muckpile.results.metrics import UNITS, PileMetrics
 from castblast.muckpile.results.profile import mean_profile
+from castblast.report.piles.movement_figures import draw_movement, draw_ore, draw_profiles
+from castblast.report.piles.muckpile_figures import (
+    draw_energy,
+    draw_plan,
+    draw_section,
+    draw_sections,
+)
+from castblast.report.piles.muckpile_view import draw_view
 from castblast.scene.begun import Start
 from castblast.specs.bench.bench import BenchSpec
 from castblast.stages.muckpile.ore import OreRun, describe_ore, ore_rows
@@ -198,15 +206,6 @@ def _draw(
     folder: Path, spec: BenchSpec, case: CastCase, result: CastResult, ore: OreRun | None
 ) -> list[Path]:
     """Draw all pictures of a run."""
-    from castblast.report.piles.movement_figures import draw_movement, draw_ore, draw_profiles
-    from castblast.report.piles.muckpile_figures import (
-        draw_energy,
-        draw_plan,
-        draw_section,
-        draw_sections,
-    )
-    from castblast.report.piles.muckpile_view import draw_view
-
     bench, walls = spec.bench.to_bench(), case.walls
     before, after = case.particles, result.particles
     surface = pile_surface(before, after, bench, walls)

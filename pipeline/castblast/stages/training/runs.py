@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from castblast.errors import SpecError, nearest_name
 from castblast.stages.outcome import Outcome
 from castblast.stages.training.train import RUNS_FOLDER
+from castblast.surrogate.keeping.run_list import read_runs
 
 if TYPE_CHECKING:
     from castblast.surrogate.keeping.run_list import RunEntry
@@ -45,8 +46,6 @@ def list_runs(
     SpecError
         No lab book, no such experiment, stage or metric.
     """
-    from castblast.surrogate.keeping.run_list import read_runs
-
     entries = read_runs(runs / "mlflow.db", experiment)
     if stage is not None:
         stages = sorted({entry.tags.get("stage", "") for entry in entries} - {""})

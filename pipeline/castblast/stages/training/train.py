@@ -12,8 +12,10 @@ from castblast.api.training.fits import (
     note_dataset,
     require_training,
 )
+from castblast.disk.files import require_writable
 from castblast.disk.resources import resource
 from castblast.progress import ProgressCallback, silent
+from castblast.specs.models.model import read_model_specs, refuse_code
 from castblast.stages.outcome import Outcome
 from castblast.surrogate.fitting.metrics import show_r_squared, show_share
 
@@ -62,13 +64,10 @@ def train(
     DatasetError
         An unusable dataset: damaged, missing columns, too few rows.
     """
-    from castblast.specs.models.model import read_model_specs, refuse_code
-
     chosen = read_model_specs(list(specs) or [resource("models/specs/reference_mlp.yaml")])
     refuse_code(chosen, allowed=allow_code)
     require_training("castblast train", chosen, tracking=tracking)
     from castblast.dataset.file.store import open_dataset
-    from castblast.disk.files import require_writable
     from castblast.surrogate.fitting.rows import read_rows
 
     table = read_rows(open_dataset(dataset), chosen, dataset)

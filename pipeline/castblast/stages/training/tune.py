@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from castblast.api.training.fits import require_training
-from castblast.disk.files import write_json, write_text
+from castblast.disk.files import require_writable, write_json, write_text
 from castblast.progress import ProgressCallback, silent
+from castblast.specs.models.model import read_model_spec, refuse_code
 from castblast.stages.outcome import Outcome
 from castblast.stages.training.train import RUNS_FOLDER
 from castblast.surrogate.fitting.metrics import show_share
@@ -67,13 +68,10 @@ def tune(
     DatasetError
         An unusable dataset.
     """
-    from castblast.specs.models.model import read_model_spec, refuse_code
-
     wanted = read_model_spec(spec)
     refuse_code([wanted], allowed=allow_code)
     require_training("castblast tune", [wanted], "tune", tracking=tracking)
     from castblast.dataset.file.store import open_dataset
-    from castblast.disk.files import require_writable
     from castblast.surrogate.fitting.rows import read_rows
     from castblast.surrogate.searching import tuning
 

@@ -14,6 +14,7 @@ import numpy as np
 from sklearn.base import BaseEstimator, RegressorMixin
 
 from castblast.errors import SpecError, nearest_name
+from castblast.network import run_layers
 from castblast.surrogate.fitting.families.chains import Chain
 from castblast.surrogate.fitting.families.dense_models import layers_of
 from castblast.types import FloatArray
@@ -225,8 +226,6 @@ def _numbers(training: Mapping[str, float]) -> dict[str, Any]:
 
 def _is_same(model: Any, chain: Chain, x: Any) -> bool:
     """Whether layers give what the model gives: attributes alone do not prove it."""
-    from castblast.network import run_layers
-
     rows = np.asarray(x[:50], dtype=np.float64)
     if chain[0].weights.shape[0] != rows.shape[1]:
         return False
