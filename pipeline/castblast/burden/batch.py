@@ -123,36 +123,36 @@ def _solve_rows(
 @kernel
 def _geometry(c: BurdenColumns, i: int) -> BurdenGeometry:
     return BurdenGeometry(
-        c.burden[i],
-        c.spacing[i],
-        c.bench_height[i],
-        c.face_angle[i],
-        c.stemming_length[i],
-        c.charge_length[i],
-        c.rock_density[i],
-        c.hole_diameter[i],
-        c.charge_diameter[i],
+        burden=c.burden[i],
+        spacing=c.spacing[i],
+        bench_height=c.bench_height[i],
+        face_angle=c.face_angle[i],
+        stemming_length=c.stemming_length[i],
+        charge_length=c.charge_length[i],
+        rock_density=c.rock_density[i],
+        hole_diameter=c.hole_diameter[i],
+        charge_diameter=c.charge_diameter[i],
     )
 
 
 @kernel
 def _parameters(c: BurdenColumns, i: int) -> BurdenParameters:
     return BurdenParameters(
-        c.pressurised_width_ratio[i],
-        c.fracture_opening_ratio[i],
-        c.fracture_count[i],
-        c.fracture_friction_factor[i],
-        c.gas_front_velocity[i],
-        c.crack_velocity[i],
-        c.fracture_storage_ratio[i],
-        c.gas_viscosity[i],
-        c.initial_aperture[i],
-        c.stemming_wall_friction[i],
-        c.stemming_density[i],
-        c.stemming_porosity[i],
-        c.stemming_grain_ratio[i],
-        c.collar_discharge_coefficient[i],
-        c.floor_friction[i],
+        pressurised_width_ratio=c.pressurised_width_ratio[i],
+        fracture_opening_ratio=c.fracture_opening_ratio[i],
+        fracture_count=c.fracture_count[i],
+        fracture_friction_factor=c.fracture_friction_factor[i],
+        gas_front_velocity=c.gas_front_velocity[i],
+        crack_velocity=c.crack_velocity[i],
+        fracture_storage_ratio=c.fracture_storage_ratio[i],
+        gas_viscosity=c.gas_viscosity[i],
+        initial_aperture=c.initial_aperture[i],
+        stemming_wall_friction=c.stemming_wall_friction[i],
+        stemming_density=c.stemming_density[i],
+        stemming_porosity=c.stemming_porosity[i],
+        stemming_grain_ratio=c.stemming_grain_ratio[i],
+        collar_discharge_coefficient=c.collar_discharge_coefficient[i],
+        floor_friction=c.floor_friction[i],
     )
 
 

@@ -87,12 +87,12 @@ class Work(NamedTuple):
 def make_work() -> Work:
     """Make the arrays of the integrator."""
     return Work(
-        np.zeros(STATE_SIZE),
-        np.zeros(STATE_SIZE),
-        np.zeros((STAGE_COUNT + 1, STATE_SIZE)),
-        np.ones(STATE_SIZE),
-        np.zeros((3, STATE_SIZE)),
-        np.ones(SWITCHES),
+        state=np.zeros(STATE_SIZE),
+        new_state=np.zeros(STATE_SIZE),
+        stages=np.zeros((STAGE_COUNT + 1, STATE_SIZE)),
+        scale=np.ones(STATE_SIZE),
+        combinations=np.zeros((3, STATE_SIZE)),
+        sides=np.ones(SWITCHES),
     )
 
 

@@ -64,7 +64,14 @@ def judge_flag(
     relation: str, value: float, limit: str, passed: bool, unit: str = "", fields: str = ""
 ) -> Finding:
     """Judge a relation that holds or not."""
-    return Finding(relation, value, unit, limit, Level.OK if passed else Level.REJECT, fields)
+    return Finding(
+        relation=relation,
+        value=value,
+        unit=unit,
+        limit=limit,
+        level=Level.OK if passed else Level.REJECT,
+        fields=fields,
+    )
 
 
 def judge_deviation(
@@ -78,7 +85,9 @@ def judge_deviation(
     limit = f"within {100 * warn:.3g} %"
     if reject is not None:
         limit += f" (rejected beyond {100 * reject:.3g} %)"
-    return Finding(relation, 100.0 * value, "%", limit, level, fields)
+    return Finding(
+        relation=relation, value=100.0 * value, unit="%", limit=limit, level=level, fields=fields
+    )
 
 
 def judge_range(
@@ -93,4 +102,4 @@ def judge_range(
     if not reject[0] <= value <= reject[1]:
         level = Level.REJECT
     limit = f"{warn[0]:g} to {warn[1]:g} (rejected outside {reject[0]:g} to {reject[1]:g})"
-    return Finding(relation, value, "", limit, level, fields)
+    return Finding(relation=relation, value=value, unit="", limit=limit, level=level, fields=fields)

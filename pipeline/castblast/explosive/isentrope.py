@@ -94,7 +94,19 @@ def jwl_isentrope(
 ) -> ProductIsentrope:
     """Make an isentrope from JWL constants: `a`, `b`, `c` in Pa, the others dimensionless."""
     dummy = np.zeros(1)
-    return ProductIsentrope(False, a, b, c, r1, r2, omega, dummy, dummy, dummy, dummy)
+    return ProductIsentrope(
+        tabulated=False,
+        a=a,
+        b=b,
+        c=c,
+        r1=r1,
+        r2=r2,
+        omega=omega,
+        log_volume=dummy,
+        log_pressure=dummy,
+        log_slope=dummy,
+        energy=dummy,
+    )
 
 
 def tabulated_isentrope(
@@ -123,7 +135,19 @@ def tabulated_isentrope(
     x = np.log(np.asarray(relative_volume, dtype=np.float64))
     y = np.log(np.asarray(pressure, dtype=np.float64))
     slope = np.asarray(PchipInterpolator(x, y).derivative()(x), dtype=np.float64)
-    table = ProductIsentrope(True, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, x, y, slope, np.zeros(x.size))
+    table = ProductIsentrope(
+        tabulated=True,
+        a=0.0,
+        b=0.0,
+        c=0.0,
+        r1=1.0,
+        r2=1.0,
+        omega=1.0,
+        log_volume=x,
+        log_pressure=y,
+        log_slope=slope,
+        energy=np.zeros(x.size),
+    )
     if energy is None:
         # Beyond the last point P ~ V^slope; the integral of P dV to infinity is finite for k > 1.
         last = float(np.exp(y[-1] + x[-1]) / max(-slope[-1] - 1.0, 1e-6))

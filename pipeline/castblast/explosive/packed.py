@@ -53,8 +53,8 @@ def unpack_isentrope(packed: PackedIsentropes, k: int) -> ProductIsentrope:
     c = packed.constants[k]
     table = packed.tables[k, :, : packed.points[k]]
     return ProductIsentrope(
-        packed.tabulated[k], c[0], c[1], c[2], c[3], c[4], c[5],
-        table[0], table[1], table[2], table[3],
+        tabulated=packed.tabulated[k], a=c[0], b=c[1], c=c[2], r1=c[3], r2=c[4], omega=c[5],
+        log_volume=table[0], log_pressure=table[1], log_slope=table[2], energy=table[3],
     )  # fmt: skip
 
 

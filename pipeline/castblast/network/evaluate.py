@@ -163,11 +163,11 @@ def answer_rows(shell: Shell, numeric: FloatArray, values: FloatArray) -> RowPre
     """Bands and domain about the outputs (n, m) of a model of any shape for rows (n, k); SI."""
     score = density_score(shell, numeric)
     return RowPredictions(
-        values,
-        prediction_bounds(shell, values),
-        network_bounds(shell, values),
-        score,
-        in_domain(shell, numeric, score),
+        values=values,
+        prediction=prediction_bounds(shell, values),
+        network=network_bounds(shell, values),
+        score=score,
+        inside=in_domain(shell, numeric, score),
     )
 
 

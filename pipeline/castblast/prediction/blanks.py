@@ -105,11 +105,11 @@ def _joined(parts: list[_Part], count: int) -> ColumnPredictions:
     return ColumnPredictions(
         NetworkDesigns(inputs, faults, unseen),
         RowPredictions(
-            floats(lambda a: a.rows.values),
-            bounds(lambda a: a.rows.prediction),
-            bounds(lambda a: a.rows.network),
-            floats(lambda a: a.rows.score),
-            flags(lambda a: a.rows.inside),
+            values=floats(lambda a: a.rows.values),
+            prediction=bounds(lambda a: a.rows.prediction),
+            network=bounds(lambda a: a.rows.network),
+            score=floats(lambda a: a.rows.score),
+            inside=flags(lambda a: a.rows.inside),
         ),
         flags(lambda a: a.refused),
         column(lambda a: a.domain).astype(np.str_),

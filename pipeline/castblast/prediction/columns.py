@@ -199,11 +199,11 @@ def _without(rows: RowPredictions, refused: BoolArray) -> RowPredictions:
         return np.where(refused[:, None], np.nan, part)
 
     return RowPredictions(
-        blank(rows.values),
-        Bounds(*map(blank, rows.prediction)),
-        Bounds(*map(blank, rows.network)),
-        np.where(refused, np.nan, rows.score),
-        rows.inside & ~refused,
+        values=blank(rows.values),
+        prediction=Bounds(*map(blank, rows.prediction)),
+        network=Bounds(*map(blank, rows.network)),
+        score=np.where(refused, np.nan, rows.score),
+        inside=rows.inside & ~refused,
     )
 
 

@@ -188,16 +188,16 @@ class ExplosiveSpec(Spec):
         if jwl is None:
             return None
         return JwlSet(
-            self.density,
-            self.detonation_velocity,
-            jwl.A,
-            jwl.B,
-            jwl.R1,
-            jwl.R2,
-            jwl.omega,
-            jwl.C,
-            jwl.E0,
-            self.cj_pressure,
+            density=self.density,
+            detonation_velocity=self.detonation_velocity,
+            a=jwl.A,
+            b=jwl.B,
+            r1=jwl.R1,
+            r2=jwl.R2,
+            omega=jwl.omega,
+            c=jwl.C,
+            total_energy=jwl.E0,
+            cj_pressure=self.cj_pressure,
         )
 
     def table(self) -> tuple[FloatArray, FloatArray, FloatArray | None] | None:
@@ -267,13 +267,13 @@ class ExplosiveSpec(Spec):
         isentrope, total_energy = self._isentrope_and_energy()
         effect = self.diameter_effect
         return Explosive(
-            self.density,
-            self.detonation_velocity,
-            self.heat_of_explosion,
-            total_energy,
-            effect.coefficient,
-            effect.exponent,
-            isentrope,
+            density=self.density,
+            detonation_velocity=self.detonation_velocity,
+            heat_of_explosion=self.heat_of_explosion,
+            total_energy=total_energy,
+            diameter_coefficient=effect.coefficient,
+            diameter_exponent=effect.exponent,
+            isentrope=isentrope,
         )
 
     def _isentrope_and_energy(self) -> tuple[ProductIsentrope, float]:

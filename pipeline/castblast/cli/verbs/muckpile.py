@@ -117,7 +117,15 @@ def muckpile(
         "precision": precision,
         "sleeping": sleeping,
         "packings": packings,
-        "extras": Extras(ore, dig_block, flitch, animation, vtk, vtkhdf, frame_interval),
+        "extras": Extras(
+            ore=ore,
+            dig_block=dig_block,
+            flitch=flitch,
+            animation=animation,
+            vtk=vtk,
+            vtkhdf=vtkhdf,
+            frame_interval=frame_interval,
+        ),
         "decks": decks,
     }
     with screen.progress("muckpile") as progress:

@@ -38,11 +38,11 @@ class ContentHash:
             first = str(name) not in self._running
             if first:
                 self._running[str(name)] = _Running(
-                    tuple(map(str, variable.dims)),
-                    variable.shape[1:] if by_row else variable.shape,
-                    _kind(variable),
-                    str(variable.attrs.get("units", "")),
-                    hashlib.sha256(),
+                    dims=tuple(map(str, variable.dims)),
+                    rest=variable.shape[1:] if by_row else variable.shape,
+                    kind=_kind(variable),
+                    units=str(variable.attrs.get("units", "")),
+                    digest=hashlib.sha256(),
                 )
             if first or by_row:
                 self._running[str(name)].digest.update(_plain_bytes(variable.to_numpy()))

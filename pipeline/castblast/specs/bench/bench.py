@@ -94,7 +94,14 @@ class BenchGeometry(Spec):
         angle = min(self.face_angle, _RIGHT_ANGLE)
         if self.outline is None:
             length, width = self.length or math.nan, self.width or math.nan
-            return Bench(length, width, self.height, angle, self.burden, self.spacing)
+            return Bench(
+                length=length,
+                width=width,
+                height=self.height,
+                face_angle=angle,
+                burden=self.burden,
+                spacing=self.spacing,
+            )
         corners, edges = list(self.outline), list(self.edges or ())
         if polygon_area(np.array(corners)) < 0.0:
             # Turned round, the edge from corner k to k + 1 comes last but k.

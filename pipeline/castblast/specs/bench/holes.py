@@ -133,14 +133,14 @@ def read_holes(
     number = table.number
     nothing = np.full(len(place), np.nan)
     return Holes(
-        place,
-        delay,
-        number.get("velocity", nothing),
-        number.get("direction", nothing),
-        number.get("elevation", nothing),
-        _designs(table),
-        [table.where(k) for k in range(len(table.line))],
-        table.label,
+        place=place,
+        delay=delay,
+        velocity=number.get("velocity", nothing),
+        direction=number.get("direction", nothing),
+        elevation=number.get("elevation", nothing),
+        design=_designs(table),
+        where=[table.where(k) for k in range(len(table.line))],
+        label=table.label,
     )
 
 

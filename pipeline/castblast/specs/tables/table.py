@@ -179,13 +179,15 @@ class _Cells:
         """All of it, in SI."""
         heads = self.heads
         return Table(
-            self.path,
-            np.array(self.lines, dtype=np.int64),
-            {heads[k].name: scaled(c.values(), heads[k].factor) for k, c in self.numbers.items()},
-            {heads[k].name: w for k, w in self.words.items() if heads[k].kind == "text"},
-            {heads[k].name: heads[k].unit for k in self.numbers},
-            [] if self.label is None else self.words[self.label],
-            self.label_head(),
+            path=self.path,
+            line=np.array(self.lines, dtype=np.int64),
+            number={
+                heads[k].name: scaled(c.values(), heads[k].factor) for k, c in self.numbers.items()
+            },
+            text={heads[k].name: w for k, w in self.words.items() if heads[k].kind == "text"},
+            unit={heads[k].name: heads[k].unit for k in self.numbers},
+            label=[] if self.label is None else self.words[self.label],
+            label_head=self.label_head(),
         )
 
 

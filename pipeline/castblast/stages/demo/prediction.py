@@ -70,11 +70,11 @@ def _velocity_curve(path: Path, diameter: float) -> VelocityCurve:
         for b in BURDENS.tolist()
     ]
     return VelocityCurve(
-        f"{diameter * 1e3:.0f} mm hole",
-        burden,
-        velocity,
-        velocity / factor,
-        velocity * factor,
-        BURDENS,
-        np.array([values["burden_velocity"] for values in simulated]),
+        label=f"{diameter * 1e3:.0f} mm hole",
+        burden=burden,
+        velocity=velocity,
+        lower=velocity / factor,
+        upper=velocity * factor,
+        simulated_burden=BURDENS,
+        simulated_velocity=np.array([values["burden_velocity"] for values in simulated]),
     )

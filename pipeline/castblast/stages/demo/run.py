@@ -83,7 +83,7 @@ def make_demo(
     if out.exists() and not out.is_dir():
         message = f"{out}: is a file, not a folder for results"
         raise SpecError(message)
-    return Demo(out, workers, restart, recipe or resource(RECIPE), bench or resource(BENCH))
+    return Demo(out=out, workers=workers, restart=restart, recipe=recipe or resource(RECIPE), bench=bench or resource(BENCH))
 
 
 def _make_dataset(demo: Demo, progress: ProgressCallback) -> list[str]:

@@ -83,7 +83,13 @@ def fit_density(
     whitening = np.ascontiguousarray(np.swapaxes(mixture.precisions_cholesky_, 1, 2))
     diagonals = np.diagonal(whitening, axis1=1, axis2=2)
     offsets = -2.0 * (np.log(diagonals).sum(axis=1) + np.log(mixture.weights_))
-    score = DensityScore(mixture.means_, whitening, offsets - offsets.min(), 1.0, LEVEL)
+    score = DensityScore(
+        centres=mixture.means_,
+        whitening=whitening,
+        offsets=offsets - offsets.min(),
+        threshold=1.0,
+        level=LEVEL,
+    )
     rank = min(math.ceil((len(held) + 1) * LEVEL), len(held))
     threshold = float(np.sort(score.distances(held).min(axis=0))[rank - 1])
     return replace(score, threshold=threshold, level=min(LEVEL, rank / (len(held) + 1)))

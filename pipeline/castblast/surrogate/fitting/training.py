@@ -176,7 +176,17 @@ def fit_spec(
     progress(1.0, f"{spec.name}: 95 % within {restart.valid_error:.2%} on validation rows")
     restarts = tuple(run[1] for run in runs)
     seconds = time.perf_counter() - started
-    return Fit(spec, estimator, network, table, predicted, band, restarts, chosen, seconds)
+    return Fit(
+        spec=spec,
+        estimator=estimator,
+        network=network,
+        table=table,
+        predicted=predicted,
+        band=band,
+        restarts=restarts,
+        chosen=chosen,
+        seconds=seconds,
+    )
 
 
 def _run(

@@ -101,7 +101,14 @@ def fit_power_law(rows: Sequence[float], errors: Sequence[float]) -> PowerLaw:
         _fit(n, fitted + scatter * rng.standard_normal(len(n)), start=best) for _ in range(_DRAWS)
     ]
     floor, scale, exponent = best.tolist()
-    return PowerLaw(floor, scale, exponent, np.array(draws), scatter, float(n.max()))
+    return PowerLaw(
+        floor=floor,
+        scale=scale,
+        exponent=exponent,
+        draws=np.array(draws),
+        scatter=scatter,
+        most_rows=float(n.max()),
+    )
 
 
 def learning_report(points: Sequence[LearningPoint], marks: Mapping[str, float]) -> dict[str, Any]:

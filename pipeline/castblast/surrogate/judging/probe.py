@@ -195,7 +195,14 @@ def physics_probe(
     names = domain.simulator.output_names
     by_name = {name: outputs[:, j] for j, name in enumerate(names)}
     progress(1.0, "physics gate: simulator done")
-    return Probe(domain, grid, by_name, tuple(pairs), everywhere, dense_pairs)
+    return Probe(
+        domain=domain,
+        points=grid,
+        outputs=by_name,
+        pairs=tuple(pairs),
+        dense=everywhere,
+        dense_pairs=dense_pairs,
+    )
 
 
 def make_pairs(domain: Domain, points: Points, direction: Direction) -> Pairs:
@@ -209,7 +216,9 @@ def make_pairs(domain: Domain, points: Points, direction: Direction) -> Pairs:
     low, high, at = (part.take(rows) for part in (*ends, points))
     step = np.log(high.inputs[direction.name] / low.inputs[direction.name])
     sign = _required_sign(direction, at)
-    return Pairs(direction, low, high, at, step, sign, np.empty(0))
+    return Pairs(
+        direction=direction, low=low, high=high, at=at, step=step, sign=sign, slope=np.empty(0)
+    )
 
 
 def _with_slopes(domain: Domain, pairs: Pairs) -> Pairs:

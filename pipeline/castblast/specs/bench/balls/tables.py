@@ -161,12 +161,12 @@ def _balls_of(table: Table) -> BallTable:
         row = int(np.argmax(~np.isclose(2.0 * radius, number["diameter"], rtol=1e-5)))
         raise SpecError(f"{table.where(row)}: the diameter is not twice the radius")
     return BallTable(
-        table,
-        _columns(table, _PLACE),
-        radius,
-        _columns(table, _MOTION) if groups[0] else None,
-        _columns(table, _SPIN) if groups[1] else None,
-        number["block"].astype(np.int64) if "block" in number else None,
+        table=table,
+        place=_columns(table, _PLACE),
+        radius=radius,
+        velocity=_columns(table, _MOTION) if groups[0] else None,
+        spin=_columns(table, _SPIN) if groups[1] else None,
+        block=number["block"].astype(np.int64) if "block" in number else None,
     )
 
 

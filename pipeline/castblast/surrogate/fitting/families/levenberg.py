@@ -117,7 +117,13 @@ def fit_dense(
         )
         if not converged and len(history) <= max_steps:
             matrix, gradient, square = net.normal_equations(weights)
-    return LevenbergResult(net.layers(weights), weights, len(history) - 1, converged, objective)
+    return LevenbergResult(
+        layers=net.layers(weights),
+        weights=weights,
+        steps=len(history) - 1,
+        converged=converged,
+        objective=objective,
+    )
 
 
 def _solve(matrix: FloatArray, slope: FloatArray, shift: float) -> FloatArray | None:

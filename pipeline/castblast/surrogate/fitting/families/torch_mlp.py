@@ -10,7 +10,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, Self
 
 import numpy as np
@@ -129,10 +129,7 @@ class TorchMlp(ChainRegressor):
         return one_for_each(chains)
 
     def _fit_rows(self, x: FloatArray, y: FloatArray, seed: int, watch: Watch | None) -> Chain:
-        schedule = Schedule(
-            self.adam_epochs, self.batch_size, self.learning_rate, self.max_iterations,
-            self.tolerance, self.penalty,
-        )  # fmt: skip
+        schedule = Schedule(**{f.name: getattr(self, f.name) for f in fields(Schedule)})
         with determined(seed):
             module = _dense(x.shape[1], self.hidden_layers, self.activation, y.shape[1])
             training = train_module(module, x, y, schedule, seed, watch)
