@@ -19,6 +19,8 @@ from typing import TYPE_CHECKING, Any
 from castblast.version import __version__
 
 if TYPE_CHECKING:
+    from castblast.api.bench import Bench, load_bench
+    from castblast.api.casting import cast
     from castblast.api.catalogue import explosives, variables
     from castblast.api.datasets import generate, open_dataset
     from castblast.api.fitting import compare, fit
@@ -27,12 +29,15 @@ if TYPE_CHECKING:
     from castblast.api.simulation import simulate
 
 __all__ = [
+    "Bench",
     "Model",
     "__version__",
+    "cast",
     "compare",
     "explosives",
     "fit",
     "generate",
+    "load_bench",
     "load_model",
     "open_dataset",
     "sample",
@@ -42,12 +47,15 @@ __all__ = [
 ]
 
 _HOMES = {
+    "Bench": "bench",
     "Model": "model",
+    "cast": "casting",
     "compare": "fitting",
     "fit": "fitting",
     "generate": "datasets",
     "open_dataset": "datasets",
     "explosives": "catalogue",
+    "load_bench": "bench",
     "load_model": "model",
     "sample": "many",
     "simulate": "simulation",

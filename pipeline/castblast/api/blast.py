@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from castblast.api.frames import cf_attributes, frame, library
-from castblast.api.markup import bar, box, table
-from castblast.api.values import Quantity
+from castblast.api.shared.frames import cf_attributes, frame, library
+from castblast.api.shared.markup import bar, box, table
+from castblast.api.shared.values import Quantity
 from castblast.bands import BAND_TITLE, BAND_WORDS, band_document, show_band, show_value
 from castblast.blast.run import (
     BlastResult,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from castblast.api.frames import frame
+from castblast.api.shared.frames import frame
 from castblast.design.variables import INPUT_NAMES, INPUTS, OUTPUTS
 from castblast.explosive.isentrope import pressure
 from castblast.specs.catalogue import explosive_aliases, explosive_names

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from castblast.api.frames import library
 from castblast.api.many import resized
-from castblast.api.reporting import Progress, reporter
+from castblast.api.shared.frames import library
+from castblast.api.shared.reporting import Progress, reporter
 from castblast.dataset.file.form import require_form
 from castblast.dataset.file.schema import (
     flag_attributes,

@@ -10,10 +10,10 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, TypeAlias, Union
 
 from castblast.api.datasets import encoded, open_dataset
-from castblast.api.frames import frame
-from castblast.api.markup import box, table
 from castblast.api.model import Model
-from castblast.api.reporting import Progress, reporter
+from castblast.api.shared.frames import frame
+from castblast.api.shared.markup import box, table
+from castblast.api.shared.reporting import Progress, reporter
 from castblast.bands import BAND_WORDS
 from castblast.disk.files import write_text
 from castblast.disk.resources import shipped_specs

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.api.designs import Designs, Table, read_designs
-from castblast.api.frames import cf_attributes, library, with_units
-from castblast.api.reporting import Progress, reporter
+from castblast.api.shared.designs import Designs, Table, read_designs
+from castblast.api.shared.frames import cf_attributes, library, with_units
+from castblast.api.shared.reporting import Progress, reporter
 from castblast.api.simulation import blast_settings
 from castblast.blast.inputs import resolve_columns
 from castblast.blast.run import BlastSettings, batch_values, run_blasts

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from castblast.api.designs import Designs, Table, read_designs
-from castblast.api.frames import frame, library
-from castblast.api.markup import box, table
+from castblast.api.shared.designs import Designs, Table, read_designs
+from castblast.api.shared.frames import frame, library
+from castblast.api.shared.markup import box, table
 from castblast.bands import BAND_TITLE, BAND_WORDS, prediction_factor
 from castblast.design.variables import VARIABLES
 from castblast.disk.files import write_text

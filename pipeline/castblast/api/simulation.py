@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from castblast.api.blast import Blast
-from castblast.api.values import Quantity, si_values
+from castblast.api.shared.values import Quantity, si_values
 from castblast.blast.inputs import resolve_inputs
 from castblast.blast.run import BlastCase, BlastSettings, make_case, result_values, run_blast
 from castblast.design.hole import expanded_hole_faults

@@ -132,6 +132,12 @@ def _named(network: Network, values: FloatArray) -> dict[str, float]:
     return dict(zip(network.output_names, values.tolist(), strict=True))
 
 
+def domain_remarks(document: Mapping[str, Any]) -> list[str]:
+    """Lines about an answer that is not inside the training data, one for each reason."""
+    lead = "unusual among" if document["domain"] == "unusual" else "outside"
+    return [f"{lead} the training data: {line}" for line in document["domain_faults"]]
+
+
 def complete_inputs(values: Mapping[str, float], network: Network) -> dict[str, float]:
     """Fill in what a network needs from what is given and the defaults.
 

@@ -26,8 +26,9 @@ def with_options(spec: BenchSpec, balls: int | None, velocity: str | float | Non
             made["fragments"] = spec.balls.fragments.model_copy(update={"smallest": None})
         update["balls"] = spec.balls.model_copy(update=made)
         if not _FEWEST_BALLS <= balls <= MOST_BALLS:
-            message = f"--balls: {balls:,}: allowed: {_FEWEST_BALLS} to {MOST_BALLS:,}"
-            raise SpecError(message)
+            limits = f"{_FEWEST_BALLS} to {MOST_BALLS:,}"
+            message = f"--balls: {balls:,}: allowed: {limits}"
+            raise SpecError(message, field="balls", value=balls, allowed=limits)
     if velocity is not None:
         if isinstance(velocity, str):
             velocity = parse_quantity(velocity, "m s-1", "--velocity")
@@ -35,7 +36,8 @@ def with_options(spec: BenchSpec, balls: int | None, velocity: str | float | Non
             message = (
                 f"--velocity: {velocity:g} m/s: implausible; allowed: 0 to {_MAX_VELOCITY:g} m/s"
             )
-            raise SpecError(message)
+            limits = f"0 to {_MAX_VELOCITY:g} m/s"
+            raise SpecError(message, field="velocity", value=velocity, allowed=limits)
         if spec.firing.pattern == "none":
             message = f"--velocity: {spec.name} is not fired (firing.pattern: none)"
             raise SpecError(message)

@@ -13,6 +13,7 @@ from castblast.design.rule import complete_columns
 from castblast.errors import SpecError
 from castblast.muckpile.bench.geometry import Bench, assign_blocks, block_centres, block_velocities
 from castblast.muckpile.bench.timing import firing_front_azimuth, nearest_holes, scatter_delays
+from castblast.network import Network
 from castblast.prediction.answer import predict
 from castblast.specs.bench.bench import BenchSpec
 from castblast.specs.bench.holes import Holes, blocks_of_holes, read_holes
@@ -71,7 +72,14 @@ class _Charges(NamedTuple):
     elevation: FloatArray
 
 
-def make_plan(spec: BenchSpec, bench: Bench, folder: Path, *, one_speed: bool = False) -> Plan:
+def make_plan(
+    spec: BenchSpec,
+    bench: Bench,
+    folder: Path,
+    *,
+    one_speed: bool = False,
+    network: Network | None = None,
+) -> Plan:
     """Work out the firing of a bench.
 
     Parameters
@@ -82,6 +90,8 @@ def make_plan(spec: BenchSpec, bench: Bench, folder: Path, *, one_speed: bool = 
         Of the bench file, where its other files lie.
     one_speed : bool
         The velocity of `spec` holds for all, whatever a file of holes says.
+    network : Network, optional
+        What predicts velocities; default: the one that comes with castblast.
 
     Raises
     ------
@@ -90,7 +100,7 @@ def make_plan(spec: BenchSpec, bench: Bench, folder: Path, *, one_speed: bool = 
     """
     firing = spec.firing
     if firing.holes is None:
-        speed, prediction = _common_speed(spec)
+        speed, prediction = _common_speed(spec, network)
         delay = firing.block_delay(bench)
         charges = _charges(spec, bench, block_centres(bench), delay, np.full(len(delay), speed))
         return _fire(spec, charges, np.arange(len(delay)), prediction)
@@ -102,7 +112,7 @@ def make_plan(spec: BenchSpec, bench: Bench, folder: Path, *, one_speed: bool = 
         frame=spec.frame,
         columns=firing.columns,
     )
-    each, prediction = _hole_speeds(spec, holes, one_speed=one_speed)
+    each, prediction = _hole_speeds(spec, holes, network, one_speed=one_speed)
     charges = _charges(spec, bench, holes.place, holes.delay + firing.start, each)
     charges = charges._replace(
         azimuth=np.where(np.isnan(holes.direction), charges.azimuth, holes.direction),
@@ -150,20 +160,20 @@ def _fire(
     return Plan(delay, np.ascontiguousarray(velocity), speed, prediction)
 
 
-def _common_speed(spec: BenchSpec) -> tuple[float, dict[str, Any] | None]:
+def _common_speed(spec: BenchSpec, network: Network | None) -> tuple[float, dict[str, Any] | None]:
     design = spec.design()
     if design is None:
         return spec.velocity or 0.0, None
     try:
-        answer = _predict(design)
+        answer = _predict(design, network)
     except SpecError as fault:
         lines = [f"{spec.name}: surrogate: {line}" for line in str(fault).splitlines()]
         raise SpecError("\n".join(lines)) from None
     return answer["burden_velocity"], {key: answer[key] for key in _KEPT} | _velocity_band(answer)
 
 
-def _predict(design: Mapping[str, Any]) -> dict[str, Any]:
-    return predict(_inputs(design), design["explosive"])
+def _predict(design: Mapping[str, Any], network: Network | None) -> dict[str, Any]:
+    return predict(_inputs(design), design["explosive"], network)
 
 
 def _inputs(design: Mapping[str, Any]) -> dict[str, float]:
@@ -171,7 +181,7 @@ def _inputs(design: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _hole_speeds(
-    spec: BenchSpec, holes: Holes, *, one_speed: bool
+    spec: BenchSpec, holes: Holes, network: Network | None, *, one_speed: bool
 ) -> tuple[FloatArray, dict[str, Any] | None]:
     """Velocity of each hole: its own, or by its own design, or that of the bench file."""
     own = np.full(len(holes.delay), np.nan) if one_speed else holes.velocity
@@ -192,7 +202,7 @@ def _hole_speeds(
         try:
             complete = _charged(design, holes.design[k])
             key = repr(sorted(complete.items()))
-            answers[key] = answers.get(key) or _predict(complete)
+            answers[key] = answers.get(key) or _predict(complete, network)
         except SpecError as fault:
             faults += [f"{holes.where[k]}: {line}" for line in str(fault).splitlines()]
             continue

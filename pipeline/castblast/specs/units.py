@@ -8,6 +8,9 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from fractions import Fraction
 from functools import cache
 from typing import NamedTuple, NoReturn, TypeVar
@@ -249,6 +252,20 @@ def needs(unit: str) -> str:
     return f"{name} is needed" + (f", such as '{example}'" if example else "")
 
 
+#: Whether a number without a unit is in SI: in Python it is, in a file it is refused.
+_BARE_IS_SI: ContextVar[bool] = ContextVar("bare_is_si", default=False)
+
+
+@contextmanager
+def numbers_in_si() -> Iterator[None]:
+    """Take numbers without a unit as SI while specs are made from Python values."""
+    token = _BARE_IS_SI.set(True)
+    try:
+        yield
+    finally:
+        _BARE_IS_SI.reset(token)
+
+
 def convert(value: object, unit: str) -> float:
     """Turn a written value into the SI `unit`.
 
@@ -279,6 +296,8 @@ def convert(value: object, unit: str) -> float:
     if not math.isfinite(number):
         message = f"not a finite number; {needs(unit)}"
         raise QuantityError(message)
+    if not isinstance(value, str) and _BARE_IS_SI.get():
+        return number
     result = scaled(number, unit_factor(written, unit))
     if not math.isfinite(result):
         message = f"not a finite number; {needs(unit)}"

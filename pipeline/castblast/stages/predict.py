@@ -13,7 +13,7 @@ from castblast.bands import BAND_HEADER, BAND_WORDS, show_band, show_value
 from castblast.design.variables import VARIABLES
 from castblast.names import as_words
 from castblast.network import Network
-from castblast.prediction.answer import load_network, predict
+from castblast.prediction.answer import domain_remarks, load_network, predict
 from castblast.specs.case import parse_values
 from castblast.stages.outcome import Outcome
 
@@ -33,12 +33,6 @@ def predict_design(
         remarks.append(f"inside the training data: density score {score:.2f}, the limit is 1")
     title = f"{document['explosive']}, {document['model']['name']}"
     return Outcome(document=document, title=title, header=BAND_HEADER, rows=rows, remarks=remarks)
-
-
-def domain_remarks(document: Mapping[str, Any]) -> list[str]:
-    """Lines about an answer that is not inside the training data, one for each reason."""
-    lead = "unusual among" if document["domain"] == "unusual" else "outside"
-    return [f"{lead} the training data: {line}" for line in document["domain_faults"]]
 
 
 def _row(model: Network, name: str, document: Mapping[str, Any]) -> tuple[str, str, str, str]:

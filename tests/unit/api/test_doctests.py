@@ -9,7 +9,10 @@ import pytest
 import castblast
 
 _FLAGS = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
-_MODULES = sorted(path.stem for path in Path(castblast.__path__[0], "api").glob("[a-z]*.py"))
+_API = Path(castblast.__path__[0], "api")
+_MODULES = sorted(
+    ".".join(path.relative_to(_API).with_suffix("").parts) for path in _API.rglob("[a-z]*.py")
+)
 
 
 @pytest.mark.parametrize("name", _MODULES)

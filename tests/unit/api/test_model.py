@@ -117,7 +117,7 @@ def test_what_a_model_says_of_itself(model: "cb.Model") -> None:
 
 
 def test_a_missing_library_is_named(model: "cb.Model", monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("castblast.api.frames.is_installed", lambda name: name != "pandas")
+    monkeypatch.setattr("castblast.api.shared.frames.is_installed", lambda name: name != "pandas")
     with pytest.raises(CastblastError, match=r'pip install "castblast\[data\]"'):
         model.predict({"burden": [4.0]})
     with pytest.raises(CastblastError, match="pandas"):

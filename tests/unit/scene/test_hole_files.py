@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from castblast.api.muckpile.tables import block_columns
 from castblast.errors import SpecError
 from castblast.muckpile.bench.geometry import Bench
 from castblast.scene.plan import make_plan
@@ -17,7 +18,6 @@ from castblast.specs.bench.frame import FrameSpec, suggest_frame
 from castblast.specs.bench.holes import Holes, read_holes
 from castblast.specs.bench.ore import read_ore
 from castblast.specs.loading import make_spec
-from castblast.stages.muckpile.tables import block_columns
 
 DATA = Path(__file__).parents[1] / "data" / "holes"
 BENCH = Bench(18.0, 9.0, 10.0, burden=3.0, spacing=3.6)

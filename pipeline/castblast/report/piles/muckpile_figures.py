@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from castblast.muckpile.balls.particles import Particles
 from castblast.muckpile.bench.geometry import Bench
@@ -24,7 +25,17 @@ from castblast.report.piles.blocks import (
     shown_range,
 )
 from castblast.report.piles.ground import draw_ground_line
-from castblast.report.style import BLUE, GREEN, GREY, ORANGE, RED, in_style, new_figure, save_figure
+from castblast.report.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    RED,
+    finished,
+    in_style,
+    new_figure,
+    save_figure,
+)
 from castblast.types import FloatArray
 
 if TYPE_CHECKING:
@@ -35,7 +46,6 @@ if TYPE_CHECKING:
 _Limits = tuple[float, float, float, float]
 
 
-@in_style
 def draw_section(
     path: Path,
     before: Particles,
@@ -46,12 +56,25 @@ def draw_section(
     y: float,
     mean_profile: Profile,
 ) -> Path:
+    """Draw `section_figure` into a file (PNG or SVG)."""
+    figure = section_figure(before, after, bench, walls, y=y, mean_profile=mean_profile)
+    return save_figure(figure, path, dpi=180)
+
+
+@in_style
+def section_figure(
+    before: Particles,
+    after: Particles,
+    bench: Bench,
+    walls: Walls,
+    *,
+    y: float,
+    mean_profile: Profile,
+) -> Figure:
     """Draw the bench and the muckpile in section, one above the other.
 
     Parameters
     ----------
-    path : Path
-        Picture to write (PNG or SVG).
     before, after : Particles
     bench : Bench
     walls : Walls
@@ -71,7 +94,7 @@ def draw_section(
     axes[0].set_title(f"Before, section at y = {y:.1f} m")
     axes[1].set_title("After" + left_out_words(after, x=limits[:2]))
     block_legend(figure, axes[1], bench)
-    return save_figure(figure, path, dpi=180)
+    return finished(figure)
 
 
 @in_style
@@ -144,14 +167,18 @@ def _draw_cut(
     canvas.show(axes)
 
 
-@in_style
 def draw_plan(path: Path, before: Particles, after: Particles, bench: Bench) -> Path:
+    """Draw `plan_figure` into a file (PNG or SVG)."""
+    figure = plan_figure(before, after, bench)
+    return save_figure(figure, path, dpi=180)
+
+
+@in_style
+def plan_figure(before: Particles, after: Particles, bench: Bench) -> Figure:
     """Draw bench and muckpile from above, each ball in the colour of its block.
 
     Parameters
     ----------
-    path : Path
-        Picture to write (PNG or SVG).
     before, after : Particles
     bench : Bench
     """
@@ -177,7 +204,7 @@ def draw_plan(path: Path, before: Particles, after: Particles, bench: Bench) -> 
     axes[0].set_title("Before, from above")
     axes[1].set_title("After" + left_out_words(after, x=x, y=y))
     block_legend(figure, axes[0], bench)
-    return save_figure(figure, path, dpi=180)
+    return finished(figure)
 
 
 def _plan_height(across: float, *, beside: bool) -> float:
@@ -186,14 +213,18 @@ def _plan_height(across: float, *, beside: bool) -> float:
     return min(max(height + 1.1, 3.0), 11.0)
 
 
-@in_style
 def draw_energy(path: Path, history: CastHistory, ledger: EnergyLedger) -> Path:
+    """Draw `energy_figure` into a file (PNG or SVG)."""
+    figure = energy_figure(history, ledger)
+    return save_figure(figure, path)
+
+
+@in_style
+def energy_figure(history: CastHistory, ledger: EnergyLedger) -> Figure:
     """Draw kinetic energies and the movement of the centre of mass over time, and the budget.
 
     Parameters
     ----------
-    path : Path
-        Picture to write (PNG or SVG).
     history : CastHistory
         Arrays of shape (k,), centre of mass (k, 3).
     ledger : EnergyLedger
@@ -214,7 +245,7 @@ def draw_energy(path: Path, history: CastHistory, ledger: EnergyLedger) -> Path:
     middle.set(title="Movement of the centre of mass", xlabel="time [s]", ylabel="[m]")
     middle.legend()
     _draw_budget(right, ledger)
-    return save_figure(figure, path)
+    return finished(figure)
 
 
 def _draw_budget(axes: Any, ledger: EnergyLedger) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from castblast.muckpile.balls.particles import Particles
 from castblast.muckpile.bench.geometry import Bench
@@ -18,7 +19,7 @@ from castblast.report.piles.blocks import (
     shown_range,
 )
 from castblast.report.piles.ground import INK, ground_points
-from castblast.report.style import in_style, new_figure, save_figure
+from castblast.report.style import finished, in_style, new_figure, save_figure
 from castblast.types import FloatArray
 
 if TYPE_CHECKING:
@@ -27,14 +28,18 @@ if TYPE_CHECKING:
 _VIEW_AZIMUTH, _VIEW_ELEVATION = np.radians(32.0), np.radians(30.0)
 
 
-@in_style
 def draw_view(path: Path, before: Particles, after: Particles, bench: Bench, walls: Walls) -> Path:
+    """Draw `view_figure` into a file (PNG or SVG)."""
+    figure = view_figure(before, after, bench, walls)
+    return save_figure(figure, path, dpi=180)
+
+
+@in_style
+def view_figure(before: Particles, after: Particles, bench: Bench, walls: Walls) -> Figure:
     """Draw bench and muckpile on their ground, from above and aside.
 
     Parameters
     ----------
-    path : Path
-        Picture to write (PNG or SVG).
     before, after : Particles
     bench : Bench
     walls : Walls
@@ -51,7 +56,7 @@ def draw_view(path: Path, before: Particles, after: Particles, bench: Bench, wal
         panel.set_axis_off()
     _draw_scale(axes[0], scene.extent)
     block_legend(figure, axes[0], bench)
-    return save_figure(figure, path, dpi=180)
+    return finished(figure)
 
 
 class Scene:

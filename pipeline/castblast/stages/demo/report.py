@@ -12,7 +12,7 @@ from castblast.version import __version__
 from castblast.bands import BAND_SENTENCE, BAND_TITLE, show_band, show_value
 from castblast.report.html import Picture, Section, Table, write_report
 from castblast.stages.datasets.dataset import describe_dataset
-from castblast.stages.muckpile.results import metric_rows
+from castblast.api.muckpile.document import metric_rows
 from castblast.design.variables import VARIABLES
 
 _LEAD = (

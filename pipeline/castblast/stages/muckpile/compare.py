@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from castblast.api.muckpile.document import HEADER, bench_content
 from castblast.disk.files import require_writable, tried, write_json, written_together
 from castblast.disk.locks import LOCK_NAME, only_writer
 from castblast.disk.note import forget_note, read_note, write_note
@@ -24,7 +25,6 @@ from castblast.progress import ProgressCallback, silent
 from castblast.report.piles.movement_figures import draw_profiles
 from castblast.specs.bench.bench import BenchSpec, load_bench
 from castblast.stages.muckpile.read import FinishedRun, numbers, read_runs
-from castblast.stages.muckpile.results import HEADER, bench_content
 from castblast.stages.muckpile.run import run_muckpile
 from castblast.stages.outcome import Outcome
 

@@ -6,12 +6,12 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
+from castblast.api.muckpile.document import HEADER
 from castblast.disk.files import written_together
 from castblast.export.engines.lammps_deck import write_lammps_deck
 from castblast.export.engines.liggghts_deck import write_liggghts_deck
 from castblast.muckpile.cast.solver import CastCase
 from castblast.specs.bench.bench import BenchSpec
-from castblast.stages.muckpile.results import HEADER
 from castblast.stages.outcome import Outcome
 
 

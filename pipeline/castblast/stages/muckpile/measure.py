@@ -8,6 +8,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from castblast.api.muckpile.document import DOCUMENT_UNITS, HEADER, metric_rows
+from castblast.api.muckpile.files import OPTIONAL_FILES
+from castblast.api.muckpile.ore import OreRun, describe_ore
+from castblast.api.muckpile.tables import (
+    block_columns,
+    ground_profile,
+    middle_section,
+    pile_sections,
+    pile_surface,
+    profile_columns,
+)
+from castblast.api.muckpile.velocity import describe_velocity, velocity_remarks
 from castblast.disk.files import staged, tried, write_csv, write_json, write_with
 from castblast.disk.locks import LOCK_NAME, only_writer
 from castblast.disk.plain import as_plain
@@ -23,28 +35,12 @@ from castblast.muckpile.results.ore import move_ore
 from castblast.muckpile.results.profile import HeightField, Profile, mean_profile
 from castblast.report.piles.movement_figures import draw_movement, draw_ore, draw_profiles
 from castblast.report.piles.muckpile_figures import draw_plan, draw_section
+from castblast.scene.case import bench_surroundings
 from castblast.scene.plan import Plan, make_plan
 from castblast.specs.bench.balls.files import read_balls
 from castblast.specs.bench.bench import BenchSpec, load_bench
 from castblast.specs.bench.ground.spec import read_ground
 from castblast.stages.muckpile.extras import Extras, read_extras
-from castblast.stages.muckpile.ore import OreRun, describe_ore
-from castblast.stages.muckpile.results import (
-    DOCUMENT_UNITS,
-    HEADER,
-    OPTIONAL_FILES,
-    metric_rows,
-)
-from castblast.stages.muckpile.run import bench_surroundings
-from castblast.stages.muckpile.tables import (
-    block_columns,
-    ground_profile,
-    middle_section,
-    pile_sections,
-    pile_surface,
-    profile_columns,
-)
-from castblast.stages.muckpile.velocity import describe_velocity, velocity_remarks
 from castblast.stages.outcome import Outcome
 
 #: Where decks of castblast keep the balls before firing, beside the final state.

@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from castblast.api.muckpile.tables import GROUND_COLUMN, MEAN_COLUMN, X_COLUMN
 from castblast.disk.reading import read_json, read_text
 from castblast.errors import SpecError
 from castblast.muckpile.bench.geometry import Bench, check_bench
 from castblast.muckpile.results.metrics import UNITS
 from castblast.muckpile.results.profile import Profile
-from castblast.stages.muckpile.tables import GROUND_COLUMN, MEAN_COLUMN, X_COLUMN
 from castblast.types import FloatArray
 
 _METRICS, _PROFILE = "metrics.json", "profile.csv"

@@ -7,50 +7,36 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
+from castblast.api.muckpile.document import bench_content
+from castblast.api.muckpile.files import OPTIONAL_FILES, write_results
+from castblast.api.muckpile.ore import follow_ore
+from castblast.api.muckpile.velocity import velocity_remarks
 from castblast.disk.files import publish, staged, tried
 from castblast.disk.locks import LOCK_NAME, only_writer
 from castblast.disk.resources import find_spec
-from castblast.errors import SimulationError, SpecError, Status
-from castblast.muckpile.balls.particles import Particles
-from castblast.muckpile.bench.enclosure import rock_walls
+from castblast.errors import SimulationError, Status
 from castblast.muckpile.bench.geometry import Bench
-from castblast.muckpile.bench.given import pressed_share
-from castblast.muckpile.bench.surroundings import bench_walls
 from castblast.muckpile.cast.solver import CastCase, CastResult, run_cast
-from castblast.muckpile.engine.simulation import Simulation
-from castblast.muckpile.engine.threads import thread_count
-from castblast.muckpile.ground.terrain import wall_faults
-from castblast.muckpile.ground.walls import Walls, join, slope
+from castblast.muckpile.ground.walls import Walls
 from castblast.muckpile.results.metrics import pile_metrics
 from castblast.progress import ProgressCallback, silent, with_time_left
 from castblast.scene.begun import Start
 from castblast.scene.bounds import BallSizes, require_bounds
+from castblast.scene.case import bench_surroundings, cast_case, describe_sizes, require_possible
 from castblast.scene.options import with_numerics, with_options
 from castblast.scene.plan import Plan, make_plan
 from castblast.scene.start import make_start
-from castblast.specs.bench.balls.spec import ChosenSizes
 from castblast.specs.bench.bench import BenchSpec, load_bench
-from castblast.specs.bench.ground.spec import Ground, read_ground, rough_ground
+from castblast.specs.bench.ground.spec import Ground, read_ground
 from castblast.stages.muckpile.deck import Decks, write_decks
 from castblast.stages.muckpile.extras import Extras, ReadExtras, read_extras
 from castblast.stages.muckpile.frames import Frames
-from castblast.stages.muckpile.ore import follow_ore
-from castblast.stages.muckpile.results import (
-    OPTIONAL_FILES,
-    bench_content,
-    describe_run,
-    write_results,
-)
-from castblast.stages.muckpile.velocity import velocity_remarks
+from castblast.stages.muckpile.results import describe_run
 from castblast.stages.outcome import Outcome
 from castblast.stopping import StopRequest, deferred_stop
 
 _PACKING_SHARE, _CAST_SHARE = 0.25, 0.95
 _RESTART, _FAILED = "restart.npz", "unstable"
-#: Simulated time [s] that is enough for one step.
-_ONE_STEP = 1e-12
 
 
 def run_muckpile(
@@ -183,9 +169,9 @@ def _prepare(
     start, sizes = make_start(
         spec, job.bench, job.plan, job.beside, packings, job.threads, progress, require, stop
     )
-    case = _case(spec, job.walls, start.balls, job.plan, job.threads)
-    _require_possible(spec, case, job.ground)
-    more = {"fragments": _describe_sizes(sizes), **bench_content(spec, job.beside)}
+    case = cast_case(spec, job.walls, start.balls, job.plan, job.threads)
+    require_possible(spec, case, job.ground)
+    more = {"fragments": describe_sizes(sizes), **bench_content(spec, job.beside)}
     return start, case, more
 
 
@@ -279,85 +265,3 @@ def _part(progress: ProgressCallback, low: float, high: float) -> ProgressCallba
 def _long_part(progress: ProgressCallback, low: float, high: float) -> ProgressCallback:
     """The same for a part that takes long: with the time that is left of it."""
     return with_time_left(_part(progress, low, high))
-
-
-def _describe_sizes(chosen: ChosenSizes | None) -> dict[str, Any] | None:
-    """What fragments the balls stand for, and what share of their mass is left out."""
-    if chosen is None or chosen.cut is None or chosen.curve is None:
-        return None
-    cut = chosen.cut
-    return {
-        "curve": type(chosen.curve).__name__.lower(),
-        **chosen.curve._asdict(),
-        "smallest_ball": cut.smallest,
-        "largest_ball": cut.largest,
-        "mass_share_finer": cut.finer,
-        "mass_share_coarser": cut.coarser,
-    }
-
-
-def bench_surroundings(spec: BenchSpec, bench: Bench, ground: Ground) -> Walls:
-    """All that balls meet: floor, rock around the bench, slope, ground."""
-    if bench.corners:
-        parts = [rock_walls(bench)]
-    else:
-        parts = [bench_walls(bench, rear=spec.bench.rear, ends=spec.bench.ends)]
-    if spec.slope is not None:
-        parts.append(slope(spec.slope.distance, spec.slope.angle))
-    if spec.ground:
-        parts.append(ground.walls)
-    return join(*parts)
-
-
-def _case(spec: BenchSpec, walls: Walls, balls: Particles, plan: Plan, threads: int) -> CastCase:
-    if spec.firing.pattern == "none":
-        balls = balls._replace(block=np.full_like(balls.block, -1))
-    return CastCase(
-        particles=balls,
-        law=spec.contact.to_law(),
-        walls=walls,
-        block_delay=plan.delay,
-        block_velocity=plan.velocity,
-        hold_unfired=spec.firing.hold_unfired,
-        max_time=spec.stop.longest_time,
-        stop_energy_ratio=spec.stop.energy_ratio,
-        stop_duration=spec.stop.duration,
-        step_safety=spec.numerics.step_safety,
-        time_step=spec.numerics.time_step or 0.0,
-        threads=threads,
-        precision=spec.numerics.precision,
-        sleeping=spec.numerics.sleeping,
-    )
-
-
-def _require_possible(spec: BenchSpec, case: CastCase, ground: Ground) -> None:
-    """Refuse walls that cut the balls, rough ground, and a fixed step above the stable one."""
-    allowed = pressed_share(case.particles, case.law, case.gravity)
-    cuts = wall_faults(case.walls, case.particles, allowed)
-    faults = [f"{spec.name}: {cut}" for cut in cuts]
-    faults += rough_ground(ground, float(case.particles.radius.mean()))
-    if not faults and case.time_step > 0.0:
-        stable = _stable_step(case)
-        if case.time_step > stable:
-            faults.append(
-                f"{spec.name}: numerics.time_step: {case.time_step:.3g} s: above the stable step "
-                f"of these balls, {stable:.3g} s; leave it out to follow the stability rule"
-            )
-    if faults:
-        raise SpecError("\n".join(faults))
-
-
-def _stable_step(case: CastCase) -> float:
-    """Stable step [s] of the balls where they are."""
-    held = np.zeros(len(case.particles.radius), dtype=np.bool_)
-    with thread_count(case.threads):
-        run = Simulation(
-            case.particles,
-            case.law,
-            case.walls,
-            held,
-            step_safety=1.0,
-            ballistic=False,
-        )
-        run.run(_ONE_STEP, np.inf)
-    return float(run.smallest_step)

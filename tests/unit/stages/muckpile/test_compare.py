@@ -15,13 +15,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from castblast.api.muckpile.tables import GROUND_COLUMN, MEAN_COLUMN, X_COLUMN
 from castblast.disk.files import write_csv
 from castblast.errors import SpecError
 from castblast.muckpile.bench.geometry import Bench
 from castblast.muckpile.results.metrics import UNITS
 from castblast.stages.muckpile.compare import compare_runs
 from castblast.stages.muckpile.read import read_runs
-from castblast.stages.muckpile.tables import GROUND_COLUMN, MEAN_COLUMN, X_COLUMN
 
 
 def run(folder: Path, throw: float, angle: float | None = 0.3, blocks: int = 2) -> Path:

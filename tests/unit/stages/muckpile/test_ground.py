@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import yaml
 
+from castblast.api.muckpile.document import bench_content
 from castblast.errors import SpecError
 from castblast.muckpile.cast.case import CastCase, CastResult
 from castblast.muckpile.cast.solver import run_cast
@@ -20,7 +21,6 @@ from castblast.specs.bench.bench import load_bench
 from castblast.stages.muckpile import run as muckpile
 from castblast.stages.muckpile.deck import Decks
 from castblast.stages.muckpile.extras import Extras
-from castblast.stages.muckpile.results import bench_content
 from castblast.stages.muckpile.run import run_muckpile
 
 SMALL: dict[str, Any] = {

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 import yaml
 
+from castblast.api.muckpile.document import metric_rows
 from castblast.bands import BAND_WORDS, BASIS, show_band, show_value
 from castblast.errors import SpecError
 from castblast.prediction.answer import predict
 from castblast.stages.muckpile.compare import run_seeds
 from castblast.stages.muckpile.extras import Extras
-from castblast.stages.muckpile.results import metric_rows
 from castblast.stages.muckpile.run import run_muckpile
 
 SMALL: dict[str, Any] = {

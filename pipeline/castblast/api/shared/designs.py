@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, Union
 import numpy as np
 from numpy.typing import ArrayLike
 
-from castblast.api.values import as_written, si_value, unit_words
+from castblast.api.shared.values import as_written, si_value, unit_words
 from castblast.design.rule import FaultyRows, lines_by_row
 from castblast.design.variables import INPUT_NAMES, OUTPUT_NAMES, VARIABLES
 from castblast.errors import SpecError

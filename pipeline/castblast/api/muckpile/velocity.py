@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from castblast.bands import BAND_WORDS, band_document, show_band, show_value
-from castblast.stages.predict import domain_remarks
+from castblast.prediction.answer import domain_remarks
 
 _NAME = "burden_velocity"
 

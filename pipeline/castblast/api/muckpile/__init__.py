@@ -1,0 +1,1 @@
+"""A cast described: document, tables, velocity, verdict, files."""

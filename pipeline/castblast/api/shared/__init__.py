@@ -1,0 +1,1 @@
+"""What all of the face shares: values and tables in, tables and HTML out, progress."""
