@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from castblast.api.training.found import Comparison as Found
     from castblast.surrogate.fitting.features import Table
     from castblast.surrogate.fitting.training import Fit
+    from castblast.surrogate.judging.comparison import ComparisonDocument
 
 #: What the face takes as a spec: a shipped name, a file, or a spec.
 Spec: TypeAlias = Union[str, Path, "SurrogateSpec"]
@@ -218,7 +219,7 @@ class Comparison:
         """What could not be done, and why."""
         return list(self._found.remarks)
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> ComparisonDocument:
         """Everything found out as plain JSON values."""
         from castblast.api.training.document import comparison_document
 

@@ -13,13 +13,14 @@ from castblast.disk.files import write_csv, write_json, write_text
 if TYPE_CHECKING:
     from castblast.api.training.found import Comparison
     from castblast.surrogate.fitting.training import Fit
+    from castblast.surrogate.judging.comparison import ComparisonDocument
 
 #: Target shown first, where it is there.
 HEADLINE = "burden_velocity"
 
 
 def write_comparison(
-    out: Path, found: Comparison, document: dict[str, Any], seconds: float
+    out: Path, found: Comparison, document: ComparisonDocument, seconds: float
 ) -> list[Path]:
     """Write everything into a folder; the files, times last.
 
@@ -50,7 +51,7 @@ def write_comparison(
     return files
 
 
-def draw_comparison(out: Path, found: Comparison, document: Mapping[str, Any]) -> list[Path]:
+def draw_comparison(out: Path, found: Comparison, document: ComparisonDocument) -> list[Path]:
     """Write learning curves and pictures into a folder."""
     files = []
     for fit in found.fits:
@@ -59,7 +60,7 @@ def draw_comparison(out: Path, found: Comparison, document: Mapping[str, Any]) -
     return [*files, *_draw(out, found, document)]
 
 
-def comparison_document(found: Comparison) -> dict[str, Any]:
+def comparison_document(found: Comparison) -> ComparisonDocument:
     """Everything found out as plain JSON values; no times, no paths."""
     from castblast.surrogate.judging.comparison import mark_of
     from castblast.surrogate.judging.learning import learning_report
@@ -123,7 +124,7 @@ def _write_curve(folder: Path, fit: Fit, curve: Sequence[Any]) -> list[Path]:
     return [write_csv(folder / "learning_curve.csv", columns), picture]
 
 
-def _draw(out: Path, found: Comparison, document: Mapping[str, Any]) -> list[Path]:
+def _draw(out: Path, found: Comparison, document: ComparisonDocument) -> list[Path]:
     """Pictures of the league, of the gate, and of all that is asked of the chosen model."""
     from castblast.report.models.error_figures import draw_error_maps, draw_shifts, draw_strata
     from castblast.report.models.inquiry_figures import draw_learning_laws, draw_sobol
@@ -145,7 +146,7 @@ def _draw(out: Path, found: Comparison, document: Mapping[str, Any]) -> list[Pat
         files.append(draw_gate(out / "gate.png", found.gates))
     if found.shifts:
         files.append(draw_shifts(out / "shifts.png", document["shifts"]))
-    if found.sobol is not None:
+    if document["sobol"] is not None:
         title = f"{name}: Sobol indices over the domain"
         files.append(draw_sobol(out / "sobol.png", title, document["sobol"]))
     if name in document["learning"]:

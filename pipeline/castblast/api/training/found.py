@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from castblast.surrogate.fitting.features import Table
     from castblast.surrogate.fitting.training import Fit
+    from castblast.surrogate.judging.comparison import League
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ class Comparison:
     ----------
     fits : list of Fit
     table : Table
-    league : dict
+    league : League
         From `surrogate.judging.comparison.compare`.
     gates : mapping of name to dict
         Empty where the domain is not known.
@@ -84,7 +85,7 @@ class Comparison:
 
     fits: list[Fit]
     table: Table
-    league: dict[str, Any]
+    league: League
     gates: Mapping[str, dict[str, Any]]
     chosen: Fit
     curves: Mapping[str, Any]

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from castblast.design.variables import VARIABLES
 from castblast.names import as_words
 from castblast.report.html import Picture, Section, Table, write_report
 from castblast.surrogate.fitting.metrics import show_r_squared, show_share
 from castblast.version import __version__
+
+if TYPE_CHECKING:
+    from castblast.surrogate.judging.comparison import ComparisonDocument
 
 Document = Mapping[str, Any]
 #: Broken rules named per model; the picture shows all.
@@ -27,7 +30,7 @@ _CAPTIONS = {
 }
 
 
-def write_page(path: Path, document: Document, files: Sequence[Path]) -> Path:
+def write_page(path: Path, document: ComparisonDocument, files: Sequence[Path]) -> Path:
     """Render a comparison; the same document and pictures give the same page.
 
     Parameters
@@ -71,7 +74,7 @@ _LIMITS = (
 )
 
 
-def write_costs(path: Path, document: Document, costs: Document) -> Path:
+def write_costs(path: Path, document: ComparisonDocument, costs: Document) -> Path:
     """Render what the models cost, on a page of its own as it never comes out the same twice.
 
     Parameters
@@ -96,7 +99,7 @@ def write_costs(path: Path, document: Document, costs: Document) -> Path:
     )
 
 
-def _league(document: Document, pictures: Sequence[Path]) -> Section:
+def _league(document: ComparisonDocument, pictures: Sequence[Path]) -> Section:
     targets = document["targets"]
     errors, squares = [], []
     for entry in document["league"]:
@@ -148,7 +151,7 @@ def _error(entry: Document) -> str:
     return f"{show_share(entry['relative_error_95'])} ({low.removesuffix('%')}\u2011{high})"
 
 
-def _marks(document: Document) -> Section:
+def _marks(document: ComparisonDocument) -> Section:
     rows = []
     for entry in document["league"]:
         for target in document["targets"]:
@@ -176,7 +179,7 @@ def _marks(document: Document) -> Section:
     return Section("Marks", tables=[Table(header, rows, caption)])
 
 
-def _gate(document: Document, pictures: Sequence[Path]) -> Section | None:
+def _gate(document: ComparisonDocument, pictures: Sequence[Path]) -> Section | None:
     if not document["gate"]:
         return None
     points = [
@@ -211,7 +214,7 @@ def _reasons(reasons: Sequence[str]) -> str:
     return "; ".join(as_words(reason) for reason in reasons[:_REASONS]) + more
 
 
-def _learning(document: Document, pictures: Sequence[Path]) -> Section:
+def _learning(document: ComparisonDocument, pictures: Sequence[Path]) -> Section:
     rows = []
     for name, report in document["learning"].items():
         for target, entry in report.items():
@@ -242,7 +245,7 @@ def _learning(document: Document, pictures: Sequence[Path]) -> Section:
     )  # fmt: skip
 
 
-def _shifts(document: Document, pictures: Sequence[Path]) -> Section | None:
+def _shifts(document: ComparisonDocument, pictures: Sequence[Path]) -> Section | None:
     if not document["shifts"]:
         return None
     rows = []
@@ -270,7 +273,7 @@ def _shifts(document: Document, pictures: Sequence[Path]) -> Section | None:
     )  # fmt: skip
 
 
-def _strata(document: Document, pictures: Sequence[Path]) -> Section:
+def _strata(document: ComparisonDocument, pictures: Sequence[Path]) -> Section:
     targets = document["targets"]
     rows = [
         [as_words(kind), *(show_share(scores[name]["relative_error_95"]) for name in targets)]
@@ -281,7 +284,7 @@ def _strata(document: Document, pictures: Sequence[Path]) -> Section:
     return Section("Where the chosen model errs", tables=[table], pictures=shown)
 
 
-def _worst(document: Document) -> Section:
+def _worst(document: ComparisonDocument) -> Section:
     rows = [
         [
             f"{case['sample']}",
@@ -298,7 +301,7 @@ def _worst(document: Document) -> Section:
     return Section("The ten worst test rows", tables=[Table(header, rows)])
 
 
-def _sobol(document: Document, pictures: Sequence[Path]) -> Section | None:
+def _sobol(document: ComparisonDocument, pictures: Sequence[Path]) -> Section | None:
     sobol = document["sobol"]
     if not sobol:
         return None

@@ -36,8 +36,8 @@ def outcome(found: Comparison, document: Mapping[str, Any], out: Path) -> Outcom
             ]
         )
     if paper["target"] == first:
-        figures = [f"{paper['r2']:.4f}", f"{paper['relative_error_95']:.1%}"]
-        rows.append([f"paper, {paper['runs']:,} runs", "", "", *figures, *("" for _ in others)])
+        published = [f"{paper['r2']:.4f}", f"{paper['relative_error_95']:.1%}"]
+        rows.append([f"paper, {paper['runs']:,} runs", "", "", *published, *("" for _ in others)])
     title = f"{league['test_rows']:,} test rows never trained on"
     return Outcome(
         document={**document, "out": str(out)},

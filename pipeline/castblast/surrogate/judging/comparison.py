@@ -9,13 +9,13 @@ twice.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypedDict
 
 import numpy as np
 
 from castblast.disk.plain import finite
 from castblast.errors import SpecError
-from castblast.surrogate.fitting.metrics import WITHIN, error_quantile, r_squared, score
+from castblast.surrogate.fitting.metrics import error_quantile, r_squared, score
 from castblast.surrogate.fitting.training import Fit
 from castblast.types import FloatArray, IntArray
 
@@ -37,14 +37,102 @@ class Mark(NamedTuple):
     relative_error_95: float
 
 
+class PaperFigures(TypedDict):
+    """Published figures of the target they are for."""
+
+    target: str
+    r2: float
+    relative_error_95: float
+    runs: float
+
+
+class MarkFigures(TypedDict):
+    """A mark and how far a fit is from it: 1 or less is met; 3 is three times the error allowed."""
+
+    r2: float
+    relative_error_95: float
+    met: bool
+    error_over_mark: float | None
+    variance_left_over_mark: float | None
+
+
+#: Figures of one fit for one target on test rows, with 95 % intervals; None: not finite.
+TargetFigures = TypedDict(
+    "TargetFigures",
+    {
+        "r2": float | None,
+        "r2_interval": list[float | None],
+        "relative_error_95": float | None,
+        "relative_error_95_interval": list[float | None],
+        "share_within_0.025": float,
+        "meets_paper_r2": bool,
+        "meets_paper_error": bool,
+        "mark": MarkFigures,
+    },
+)
+
+
+class LeagueEntry(TypedDict):
+    """One fit of the league; ``gate_passed`` is None where the gate did not judge it."""
+
+    name: str
+    kind: str
+    description: str
+    exportable: bool
+    gate_passed: bool | None
+    gate_reasons: list[str]
+    parameters: int | None
+    bytes: int | None
+    converged: bool
+    iterations: int
+    valid_error: float | None
+    test_error: float | None
+    distinguishable_from_first: bool
+    not_distinguishable_from: list[str]
+    meets_marks: bool
+    targets: dict[str, TargetFigures]
+
+
+class League(TypedDict):
+    """The league table as it is written, see `compare`."""
+
+    rule: str
+    paper: PaperFigures
+    dataset: dict[str, Any]
+    test_rows: int
+    interval: str
+    targets: list[str]
+    chosen: str | None
+    best_exportable: str
+    best_overall: str
+    gap: float
+    league: list[LeagueEntry]
+
+
+class ComparisonDocument(League):
+    """All of a comparison as ``comparison.json`` holds it: the league and what was asked besides.
+
+    Models and targets are keys; the documents of a gate, a learning curve, shifts, strata and
+    Sobol indices are those of the modules of these names.
+    """
+
+    extent: dict[str, Any]
+    remarks: list[str]
+    gate: dict[str, dict[str, Any]]
+    paper_met_from: dict[str, int | None]
+    learning: dict[str, dict[str, Any]]
+    shifts: dict[str, dict[str, Any]]
+    strata: dict[str, Any]
+    worst_cases: list[dict[str, Any]]
+    sobol: dict[str, Any] | None
+
+
 def mark_of(target: str) -> Mark:
     """Mark of a target: sharper for the burden velocity, one for all others."""
     return Mark(0.99995, 0.005) if target == "burden_velocity" else Mark(0.9999, 0.01)
 
 
-def compare(
-    fits: Sequence[Fit], gates: Mapping[str, Mapping[str, Any]] | None = None
-) -> dict[str, Any]:
+def compare(fits: Sequence[Fit], gates: Mapping[str, Mapping[str, Any]] | None = None) -> League:
     """Rank fits of one dataset.
 
     Parameters
@@ -55,7 +143,7 @@ def compare(
 
     Returns
     -------
-    dict
+    League
         Plain JSON values without times: rule, marks of the paper, dataset; ``best_exportable``;
         ``chosen``, the same unless it fails the gate (None if all do); ``best_overall``; ``gap``,
         validation error of the chosen (else of the best exportable) over that of the best overall;
@@ -90,7 +178,12 @@ def compare(
         entries.append(_entry(fit, targets, draws, alike, best.spec.name, gate))
     return {
         "rule": _RULE + (_GATE_RULE if gates else ""),
-        "paper": {"target": "burden_velocity", **PAPER_MARKS},
+        "paper": {
+            "target": "burden_velocity",
+            "r2": PAPER_MARKS["r2"],
+            "relative_error_95": PAPER_MARKS["relative_error_95"],
+            "runs": PAPER_MARKS["runs"],
+        },
         "dataset": dict(best.table.source),
         "test_rows": len(test),
         "interval": f"95 %, percentile bootstrap over test rows, {_RESAMPLES} draws",
@@ -149,7 +242,7 @@ def _entry(
     alike: Sequence[str],
     first: str,
     gate: Mapping[str, Any] | None,
-) -> dict[str, Any]:
+) -> LeagueEntry:
     scores = {target: _target_entry(fit, target, draws) for target in targets}
     parameters = fit.network.parameter_count if fit.network else None
     return {
@@ -177,7 +270,7 @@ def _point(fit: Fit, targets: Sequence[str]) -> float:
     return float(_summary_draws(fit, targets, every)[0])
 
 
-def _target_entry(fit: Fit, target: str, draws: IntArray) -> dict[str, Any]:
+def _target_entry(fit: Fit, target: str, draws: IntArray) -> TargetFigures:
     truth, predicted = _columns(fit, target)
     point = score(truth, predicted)
     r2 = np.quantile(r_squared(truth[draws].T, predicted[draws].T), (0.025, 0.975))
@@ -190,13 +283,13 @@ def _target_entry(fit: Fit, target: str, draws: IntArray) -> dict[str, Any]:
         "r2_interval": finite(r2),
         "relative_error_95": finite(point.relative_error_95),
         "relative_error_95_interval": finite(error),
-        f"share_within_{WITHIN:g}": point.share_within,
+        "share_within_0.025": point.share_within,
         "meets_paper_r2": bool(point.r2 >= PAPER_MARKS["r2"]),
         "meets_paper_error": bool(point.relative_error_95 <= PAPER_MARKS["relative_error_95"]),
         "mark": {
-            **mark._asdict(),
+            "r2": mark.r2,
+            "relative_error_95": mark.relative_error_95,
             "met": bool(point.r2 >= mark.r2 and point.relative_error_95 <= mark.relative_error_95),
-            # 1 or less is met; 3 means three times the error, or the variance left, allowed.
             "error_over_mark": finite(point.relative_error_95 / mark.relative_error_95),
             "variance_left_over_mark": finite((1.0 - point.r2) / (1.0 - mark.r2)),
         },
