@@ -24,6 +24,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     "vtk": ("vtkmodules",),
     "stl": ("trimesh",),
     "excel": ("openpyxl",),
+    "parquet": ("pyarrow",),
     "onnx-test": ("onnxruntime",),
     "dvc": ("dvc",),
     "web": ("playwright",),

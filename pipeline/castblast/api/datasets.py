@@ -279,6 +279,33 @@ class CastblastAccessor:
             }
         return x, y
 
+    def export(
+        self, folder: str | Path, formats: tuple[str, ...] | list[str] = ("csv",)
+    ) -> list[Path]:
+        """Write the rows as tables for other tools, with a Croissant record beside them.
+
+        Parameters
+        ----------
+        folder : str or path
+        formats : sequence of {"csv", "parquet"}
+
+        Returns
+        -------
+        list of path
+
+        Raises
+        ------
+        MissingLibraryError
+            Parquet needs a library that is not installed.
+        SpecError
+            No format, or an unknown one.
+        OutputError
+            The folder cannot be written to, or the disk is full.
+        """
+        from castblast.dataset.file.tables import write_tables
+
+        return write_tables(encoded(self._dataset), Path(folder), formats)
+
     def _rows(self, split: str | None) -> Any:
         finished = self._dataset["status"].to_numpy().astype(str) == "ok"
         if split is None:

@@ -105,3 +105,18 @@ def diff(
     with screen.progress("diff") as progress:
         outcome = diff_datasets(first, second, progress)
     return screen.show(outcome)
+
+
+@verb(app, needs=("simulate", "data"))
+def export(
+    screen: Screen,
+    dataset: _Dataset,
+    to: Annotated[
+        str, typer.Option(help="Formats, with commas between: csv, parquet.", metavar="FORMATS")
+    ] = "csv",
+    out: OutFolder = None,
+) -> Mapping[str, Any]:
+    """Write the rows as CSV or Parquet for other tools, with a Croissant record beside them."""
+    from castblast.stages.datasets.export import export_dataset
+
+    return screen.show(export_dataset(dataset, to.split(","), out))
