@@ -27,7 +27,7 @@ from castblast.prediction.columns import (
 from castblast.types import FloatArray, IntArray
 
 
-def load_network(path: Path | None = None) -> Network:
+def load_network(path: str | Path | None = None) -> Network:
     """Read a network from a file, or one that comes with castblast by its name.
 
     Parameters

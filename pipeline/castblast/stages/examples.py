@@ -19,7 +19,7 @@ _COPIED = {
 }
 
 
-def copy_examples(folder: Path) -> list[Path]:
+def copy_examples(folder: str | Path) -> list[Path]:
     """Copy every shipped spec; files that are already there are never overwritten.
 
     Parameters
@@ -37,6 +37,7 @@ def copy_examples(folder: Path) -> list[Path]:
     SpecError
         Files of the same names are there, or `folder` is a file; nothing is written then.
     """
+    folder = Path(folder)
     if folder.exists() and not folder.is_dir():
         raise SpecError(f"{folder}: is a file; give a folder")
     sources = {

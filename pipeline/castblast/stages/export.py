@@ -37,13 +37,13 @@ _EXTRAS = {"excel": ("excel",)} | dict.fromkeys(
 
 
 def export(
-    fit: Path,
-    out: Path | None = None,
+    fit: str | Path,
+    out: str | Path | None = None,
     *,
     targets: Sequence[str] = ("json", "onnx"),
     verify: bool = True,
-    parity: Path | None = None,
-    histories: Path | None = None,
+    parity: str | Path | None = None,
+    histories: str | Path | None = None,
     progress: ProgressCallback = silent,
 ) -> Outcome:
     """Write the network of a fit.
@@ -76,6 +76,10 @@ def export(
     CheckError
         A file that does not give the answers of the fitted estimator.
     """
+    fit = Path(fit)
+    out = None if out is None else Path(out)
+    parity = None if parity is None else Path(parity)
+    histories = None if histories is None else Path(histories)
     wanted = _targets(targets)
     if histories is not None and "web" not in wanted:
         message = f"histories: {histories} is for the target web, not for {', '.join(wanted)}"
@@ -125,7 +129,7 @@ def _write(
     return contents
 
 
-def find_network(fit: Path) -> Path:
+def find_network(fit: str | Path) -> Path:
     """Find the network.json meant by a file, the folder of a fit or of fits, or a shipped name.
 
     Raises
@@ -133,6 +137,7 @@ def find_network(fit: Path) -> Path:
     SpecError
         There is none.
     """
+    fit = Path(fit)
     if fit.is_file():
         return fit
     if is_bare_name(fit) and not fit.is_dir() and str(fit) in SHIPPED_NETWORKS:

@@ -19,9 +19,10 @@ from castblast.stages.outcome import Outcome
 
 
 def predict_design(
-    values: Mapping[str, Any], explosive: str, network: Path | None = None
+    values: Mapping[str, Any], explosive: str, network: str | Path | None = None
 ) -> Outcome:
     """Predict one design written with units, such as ``{"burden": "3 m"}``; see `predict`."""
+    network = None if network is None else Path(network)
     model = load_network(network)
     document = predict(parse_values(values, "predict"), explosive, model)
     rows = [_row(model, name, document) for name in model.output_names]

@@ -74,8 +74,8 @@ class PredictionTable:
 
 
 def predict_csv(
-    path: Path,
-    network: Path | None = None,
+    path: str | Path,
+    network: str | Path | None = None,
     *,
     explosive: str = "anfo",
     common: Mapping[str, float] | None = None,
@@ -99,6 +99,8 @@ def predict_csv(
         Unreadable table, unknown heads or units, values that are no numbers or not plausible,
         impossible designs; the first faults, each with its line.
     """
+    path = Path(path)
+    network = None if network is None else Path(network)
     model = load_network(network)
     table = read_table(path, _FORM)
     common = common or {}

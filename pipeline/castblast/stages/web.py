@@ -20,7 +20,7 @@ SHIPPED_PAGE = "models/chosen/index.html"
 HISTORIES = "histories.json"
 
 
-def shipped_page(out: Path | None = None) -> Path:
+def shipped_page(out: str | Path | None = None) -> Path:
     """Give the path of the page that comes with castblast, or of a copy of it.
 
     Parameters
@@ -33,6 +33,7 @@ def shipped_page(out: Path | None = None) -> Path:
     SpecError
         The page did not come with this installation.
     """
+    out = None if out is None else Path(out)
     page = resource(SHIPPED_PAGE)
     if out is None:
         return page
@@ -68,7 +69,7 @@ def build_page(network: Network, source: Path, histories: Path | None = None) ->
     return to_web(network, record) | {HISTORIES: text.encode()}
 
 
-def read_histories(path: Path) -> Mapping[str, Any]:
+def read_histories(path: str | Path) -> Mapping[str, Any]:
     """Read a record of histories, or fit one to a dataset.
 
     Raises
@@ -78,6 +79,7 @@ def read_histories(path: Path) -> Mapping[str, Any]:
     DatasetError
         A dataset without histories.
     """
+    path = Path(path)
     from castblast.surrogate.history_modes import FORMAT, fit_history_modes
 
     if path.suffix != ".json":

@@ -153,7 +153,7 @@ def test_results_stay_whole_when_writing_fails(
     def fail(*_: Any) -> None:
         raise fault
 
-    monkeypatch.setattr("castblast.stages.muckpile.results.draw_energy", fail)
+    monkeypatch.setattr("castblast.report.piles.muckpile_figures.draw_energy", fail)
     with pytest.raises(type(fault)):
         run_muckpile(bench, out, velocity="8 m/s", packings=packings)
     after = contents(out)

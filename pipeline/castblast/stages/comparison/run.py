@@ -36,15 +36,15 @@ if TYPE_CHECKING:
 
 
 def compare(
-    dataset: Path,
-    specs: Sequence[Path] = (),
-    out: Path | None = None,
+    dataset: str | Path,
+    specs: Sequence[str | Path] = (),
+    out: str | Path | None = None,
     *,
-    fits: Path | None = None,
+    fits: str | Path | None = None,
     extent: Extent = FULL,
     workers: int | None = 1,
     tracking: bool = False,
-    runs: Path = RUNS_FOLDER,
+    runs: str | Path = RUNS_FOLDER,
     allow_code: bool = False,
     progress: ProgressCallback = silent,
 ) -> Outcome:
@@ -82,8 +82,13 @@ def compare(
     DatasetError
         An unusable dataset.
     """
+    dataset = Path(dataset)
+    spec_files = [Path(path) for path in specs]
+    out = None if out is None else Path(out)
+    fits = None if fits is None else Path(fits)
+    runs = Path(runs)
     started = time.perf_counter()
-    dataset, wanted, fits = _sources(dataset, specs, fits, extent)
+    dataset, wanted, fits = _sources(dataset, spec_files, fits, extent)
     refuse_code(wanted, allowed=allow_code)
     require_training("castblast compare", (), tracking=tracking)
     remarks: list[str] = []

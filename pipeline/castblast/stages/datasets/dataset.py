@@ -28,7 +28,7 @@ from castblast.stages.outcome import Outcome
 SAME = 1e-10
 
 
-def check_dataset(path: Path, progress: ProgressCallback = silent) -> list[str]:
+def check_dataset(path: str | Path, progress: ProgressCallback = silent) -> list[str]:
     """Report every departure of a file from the format; empty if there is none.
 
     Raises
@@ -36,11 +36,12 @@ def check_dataset(path: Path, progress: ProgressCallback = silent) -> list[str]:
     DatasetError
         The file cannot be read as a dataset at all.
     """
+    path = Path(path)
     with reading_dataset(path) as dataset:
         return [str(fault) for fault in check(dataset, progress)]
 
 
-def describe_dataset(path: Path) -> Outcome:
+def describe_dataset(path: str | Path) -> Outcome:
     """Say what a dataset holds: rows, splits, failures, ranges, where it comes from.
 
     Raises
@@ -48,6 +49,7 @@ def describe_dataset(path: Path) -> Outcome:
     DatasetError
         The file cannot be read as a dataset.
     """
+    path = Path(path)
     with reading_dataset(path) as dataset:
         require_form(dataset, path)
         return _describe(dataset, path)
@@ -97,7 +99,7 @@ def _describe(dataset: xr.Dataset, path: Path) -> Outcome:
     return Outcome(document=document, header=header, rows=rows, lines=lines)
 
 
-def reproduce_sample(path: Path, sample: int) -> Outcome:
+def reproduce_sample(path: str | Path, sample: int) -> Outcome:
     """Compute one sample again from the file alone and compare every output.
 
     Parameters
@@ -112,6 +114,7 @@ def reproduce_sample(path: Path, sample: int) -> Outcome:
     SpecError
         No such sample, or a recipe that this version cannot read.
     """
+    path = Path(path)
     with reading_dataset(path) as dataset:
         require_form(dataset, path)
         position = _position(dataset, sample, path)

@@ -13,7 +13,9 @@ from castblast.progress import ProgressCallback, silent
 from castblast.stages.outcome import Outcome
 
 
-def diff_datasets(first: Path, second: Path, progress: ProgressCallback = silent) -> Outcome:
+def diff_datasets(
+    first: str | Path, second: str | Path, progress: ProgressCallback = silent
+) -> Outcome:
     """Compare two datasets: what they were made from, their form, their rows and values.
 
     Raises
@@ -21,6 +23,8 @@ def diff_datasets(first: Path, second: Path, progress: ProgressCallback = silent
     DatasetError
         One of the files cannot be read as a dataset.
     """
+    first = Path(first)
+    second = Path(second)
     with reading_dataset(first) as one, reading_dataset(second) as two:
         found = compare(one, two, progress)
         ids = [str(dataset.attrs.get("id", "?")) for dataset in (one, two)]

@@ -33,10 +33,10 @@ _POOL_BATCH = 20_000
 
 
 def infill(
-    dataset: Path,
-    model: Path,
+    dataset: str | Path,
+    model: str | Path,
     rows: int,
-    out: Path,
+    out: str | Path,
     *,
     members: int = 3,
     allow_code: bool = False,
@@ -68,6 +68,9 @@ def infill(
     DatasetError, CheckError, StaleResultError
         The dataset cannot be read or extended.
     """
+    dataset = Path(dataset)
+    model = Path(model)
+    out = Path(out)
     if rows < 1:
         message = f"rows: {rows}; at least 1 is needed"
         raise SpecError(message)

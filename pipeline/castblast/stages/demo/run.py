@@ -66,12 +66,12 @@ class Demo:
 
 
 def make_demo(
-    out: Path,
+    out: str | Path,
     *,
     workers: int | None = None,
     restart: bool = False,
-    recipe: Path | None = None,
-    bench: Path | None = None,
+    recipe: str | Path | None = None,
+    bench: str | Path | None = None,
 ) -> Demo:
     """Set up a demo with the shipped recipe and bench unless others are given.
 
@@ -80,6 +80,9 @@ def make_demo(
     SpecError
         `out` is a file.
     """
+    out = Path(out)
+    recipe = None if recipe is None else Path(recipe)
+    bench = None if bench is None else Path(bench)
     if out.exists() and not out.is_dir():
         message = f"{out}: is a file, not a folder for results"
         raise SpecError(message)

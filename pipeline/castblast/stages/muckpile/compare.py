@@ -31,7 +31,7 @@ from castblast.stages.outcome import Outcome
 _PER_BLOCK = ("block_throw", "block_spread")
 
 
-def compare_runs(folders: Sequence[Path], out: Path) -> Outcome:
+def compare_runs(folders: Sequence[str | Path], out: str | Path) -> Outcome:
     """Compare finished runs, such as one bench with several seeds, or a bench with variants.
 
     Parameters
@@ -54,12 +54,14 @@ def compare_runs(folders: Sequence[Path], out: Path) -> Outcome:
     OutputError
         Nothing can be written to `out`.
     """
-    if len(folders) < 2:
+    runs_at = [Path(path) for path in folders]
+    out = Path(out)
+    if len(runs_at) < 2:
         raise SpecError("a comparison needs at least two runs")
-    runs = read_runs(folders)
+    runs = read_runs(runs_at)
     require_writable(out)
     documents = [run.document for run in runs]
-    names = _names(folders)
+    names = _names(runs_at)
     bands = metric_bands_of(documents)
     faults = _run_faults(names, documents)
     document = {
@@ -102,7 +104,7 @@ def _run_faults(names: Sequence[str], documents: Sequence[Mapping[str, Any]]) ->
 
 def run_seeds(
     bench: str | Path,
-    out: Path | None,
+    out: str | Path | None,
     seeds: int,
     *,
     progress: ProgressCallback = silent,
@@ -120,6 +122,7 @@ def run_seeds(
         At least 2.
     progress : callback
     """
+    out = None if out is None else Path(out)
     spec = load_bench(bench)
     folder = Path("runs") / spec.name if out is None else out
     first = options.pop("seed", None)

@@ -68,10 +68,10 @@ class _Measured(NamedTuple):
 
 def measure_muckpile(
     bench: str | Path,
-    final: Path,
-    out: Path | None = None,
+    final: str | Path,
+    out: str | Path | None = None,
     *,
-    start: Path | None = None,
+    start: str | Path | None = None,
     extras: Extras = Extras(),  # noqa: B008 - a record of constants
 ) -> Outcome:
     """Measure the pile that another engine made of a bench, as if it were our own run.
@@ -106,6 +106,9 @@ def measure_muckpile(
     LockedError
         Another run writes into the folder.
     """
+    final = Path(final)
+    out = None if out is None else Path(out)
+    start = None if start is None else Path(start)
     path = find_spec(bench, "bench")
     spec = load_bench(path)
     geometry = spec.bench.to_bench()

@@ -41,7 +41,7 @@ _RESTART, _FAILED = "restart.npz", "unstable"
 
 def run_muckpile(
     bench: str | Path,
-    out: Path | None = None,
+    out: str | Path | None = None,
     *,
     balls: int | None = None,
     threads: int | None = None,
@@ -49,7 +49,7 @@ def run_muckpile(
     seed: int | None = None,
     precision: str | None = None,
     sleeping: bool | None = None,
-    packings: Path | None = None,
+    packings: str | Path | None = None,
     extras: Extras = Extras(),  # noqa: B008 - a record of constants
     decks: Decks = Decks(),  # noqa: B008 - a record of constants
     progress: ProgressCallback = silent,
@@ -100,6 +100,8 @@ def run_muckpile(
     Stopped
         Ctrl-C or SIGTERM: what has been done is kept in ``restart.npz``, or beside the packings.
     """
+    out = None if out is None else Path(out)
+    packings = None if packings is None else Path(packings)
     path = find_spec(bench, "bench")
     spec = with_options(load_bench(path), balls, velocity)
     spec = with_numerics(spec, precision, sleeping)

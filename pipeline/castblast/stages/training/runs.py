@@ -19,7 +19,7 @@ DEFAULT_METRIC = "valid_error"
 
 
 def list_runs(
-    runs: Path = RUNS_FOLDER,
+    runs: str | Path = RUNS_FOLDER,
     *,
     experiment: str | None = None,
     stage: str | None = None,
@@ -46,6 +46,7 @@ def list_runs(
     SpecError
         No lab book, no such experiment, stage or metric.
     """
+    runs = Path(runs)
     entries = read_runs(runs / "mlflow.db", experiment)
     if stage is not None:
         stages = sorted({entry.tags.get("stage", "") for entry in entries} - {""})

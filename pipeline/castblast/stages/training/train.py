@@ -27,13 +27,13 @@ RUNS_FOLDER = Path("runs")
 
 
 def train(
-    dataset: Path,
-    specs: Sequence[Path],
-    out: Path | None = None,
+    dataset: str | Path,
+    specs: Sequence[str | Path],
+    out: str | Path | None = None,
     *,
     workers: int | None = 1,
     tracking: bool = False,
-    runs: Path = RUNS_FOLDER,
+    runs: str | Path = RUNS_FOLDER,
     allow_code: bool = False,
     progress: ProgressCallback = silent,
 ) -> Outcome:
@@ -64,7 +64,11 @@ def train(
     DatasetError
         An unusable dataset: damaged, missing columns, too few rows.
     """
-    chosen = read_model_specs(list(specs) or [resource("models/specs/reference_mlp.yaml")])
+    dataset = Path(dataset)
+    spec_files = [Path(path) for path in specs]
+    out = None if out is None else Path(out)
+    runs = Path(runs)
+    chosen = read_model_specs(spec_files or [resource("models/specs/reference_mlp.yaml")])
     refuse_code(chosen, allowed=allow_code)
     require_training("castblast train", chosen, tracking=tracking)
     from castblast.dataset.file.store import open_dataset

@@ -21,16 +21,16 @@ _SHOWN = 5
 
 
 def tune(
-    dataset: Path,
-    spec: Path,
+    dataset: str | Path,
+    spec: str | Path,
     *,
     trials: int | None = None,
     timeout: float | None = None,
-    study: Path | None = None,
-    out: Path | None = None,
+    study: str | Path | None = None,
+    out: str | Path | None = None,
     seed: int = 0,
     tracking: bool = False,
-    runs: Path = RUNS_FOLDER,
+    runs: str | Path = RUNS_FOLDER,
     allow_code: bool = False,
     progress: ProgressCallback = silent,
 ) -> Outcome:
@@ -68,6 +68,11 @@ def tune(
     DatasetError
         An unusable dataset.
     """
+    dataset = Path(dataset)
+    spec = Path(spec)
+    study = None if study is None else Path(study)
+    out = None if out is None else Path(out)
+    runs = Path(runs)
     wanted = read_model_spec(spec)
     refuse_code([wanted], allowed=allow_code)
     require_training("castblast tune", [wanted], "tune", tracking=tracking)
