@@ -64,13 +64,23 @@ _HOMES = {
 }
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        message = f"module 'castblast' has no attribute '{name}'"
-        raise AttributeError(message)
-    found = getattr(import_module(f"castblast.api.{_HOMES[name]}"), name)
-    globals()[name] = found
-    return found
+if not TYPE_CHECKING:  # a type checker is to refuse names that are not there
+
+    def __getattr__(name: str) -> Any:
+        if name not in _HOMES:
+            message = f"module 'castblast' has no attribute '{name}'"
+            raise AttributeError(message)
+        try:
+            found = getattr(import_module(f"castblast.api.{_HOMES[name]}"), name)
+        except ModuleNotFoundError as fault:
+            from castblast.extras import explained
+
+            missing = explained(fault, f"castblast.{name}")
+            if missing is None:
+                raise
+            raise missing from None
+        globals()[name] = found
+        return found
 
 
 def __dir__() -> list[str]:
