@@ -50,7 +50,7 @@ def _leave(stop: BaseException) -> int:
 
     code = stop.code if isinstance(stop, SystemExit) else INTERRUPTED
     if code == INTERRUPTED:
-        line = "stopped; run the same command again to go on"
+        line = "stopped; run the same command again to resume"
         cause: BaseException | None = stop
         while cause is not None and not isinstance(cause, Stopped):
             cause = cause.__cause__ or cause.__context__

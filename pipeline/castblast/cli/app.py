@@ -2,6 +2,7 @@
 
 import typer
 
+from castblast.cli.options import BLAST, DATA
 from castblast.cli.verbs import (
     datasets,
     demo,
@@ -42,7 +43,7 @@ def _options(
     """Take the options that stand before a verb."""
 
 
-for _module in (demo, predict, simulate, generate, surrogates, infill, muckpile, web, specs):
+for _module in (demo, web, specs, predict, simulate, generate, surrogates, infill, muckpile):
     _module.add_to(app)
-app.add_typer(datasets.app, name="dataset")
-app.add_typer(explosive.app, name="explosive")
+app.add_typer(datasets.app, name="dataset", rich_help_panel=DATA)
+app.add_typer(explosive.app, name="explosive", rich_help_panel=BLAST)

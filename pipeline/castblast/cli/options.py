@@ -1,9 +1,16 @@
-"""Options that several verbs share, with one wording."""
+"""Options and headings that several verbs share, with one wording."""
 
 from pathlib import Path
 from typing import Annotated, TypeAlias
 
 import typer
+
+#: Headings of ``castblast --help``, in the order of the chain.
+START = "Start here"
+BLAST = "One blast"
+DATA = "Datasets"
+MODELS = "Models"
+PILES = "Muckpiles"
 
 OutFolder: TypeAlias = Annotated[
     Path | None, typer.Option("--out", "-o", help="Folder for the results.", show_default=False)
@@ -32,8 +39,10 @@ Workers: TypeAlias = Annotated[
 Scheduler: TypeAlias = Annotated[
     str | None, typer.Option(help="Address of a running Dask scheduler.", show_default=False)
 ]
-Restart: TypeAlias = Annotated[bool, typer.Option("--restart", help="Discard earlier shards.")]
+Restart: TypeAlias = Annotated[
+    bool, typer.Option("--restart", help="Discard existing shards and start over.")
+]
 AllowCode: TypeAlias = Annotated[
     bool,
-    typer.Option("--allow-code", help="Run the Python code that specs of kind custom name."),
+    typer.Option("--allow-code", help="Allow model specs of kind custom to run their Python code."),
 ]

@@ -31,6 +31,8 @@ def verb(
     name: str | None = None,
     needs: tuple[str, ...] = (),
     compiles: str | None = None,
+    panel: str | None = None,
+    example: str = "",
 ) -> Callable[[Verb], Verb]:
     """Register a function of (screen, ...) as a verb of `app`.
 
@@ -43,6 +45,10 @@ def verb(
         Extras of castblast without which it is not begun.
     compiles : str, optional
         Subpackage whose kernels it compiles where that was not done before.
+    panel : str, optional
+        Heading that lists it in ``castblast --help``.
+    example : str
+        Command line that ``--help`` ends with; words behind ``castblast``.
     """
 
     def register(function: Verb) -> Verb:
@@ -77,7 +83,11 @@ def verb(
         command.__annotations__ = {p.name: p.annotation for p in (place, *own, *shared)}
         command.__doc__ = literal(function.__doc__ or "")
         # A verb may be called `check` in two groups: its own name is the default.
-        app.command(name or function.__name__.replace("_", "-"))(command)
+        app.command(
+            name or function.__name__.replace("_", "-"),
+            epilog=literal(f"Example: castblast {example}") if example else None,
+            rich_help_panel=panel,
+        )(command)
         return function
 
     return register

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -147,3 +148,25 @@ def test_the_first_run_says_that_it_compiles(
     (tmp_path / "nearfield_123" / "march.nbi").touch()
     small([], standalone_mode=False)
     assert "compiling" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("verb", list(_verbs(_ROOT)), ids=" ".join)
+def test_help_ends_with_an_example_that_parses(verb: tuple[str, ...]) -> None:
+    """Its words are taken by the parser of the very verb: no unknown option, nothing missing."""
+    command = _ROOT
+    for name in verb:
+        command = command.commands[name]  # type: ignore[attr-defined]
+    words = shlex.split((command.epilog or "").replace("\\[", "["))
+    assert words[: 2 + len(verb)] == ["Example:", "castblast", *verb]
+    context = command.make_context(" ".join(verb), words[2 + len(verb) :])
+    assert set(context.params) >= {p.name for p in command.params if p.required}
+
+
+def test_every_verb_is_listed_under_a_heading(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--help"]) == 0
+    shown = capsys.readouterr().out
+    headings = ("Start here", "One blast", "Datasets", "Models", "Muckpiles")
+    assert [shown.index(f" {heading} ") for heading in headings] == sorted(
+        shown.index(f" {heading} ") for heading in headings
+    )
+    assert " Commands " not in shown

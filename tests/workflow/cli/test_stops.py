@@ -89,4 +89,4 @@ def test_processes_at_work_end_without_a_word(tmp_path: Path, delay: float) -> N
     _, errors = process.communicate(timeout=60)
     assert time.monotonic() - begun < 10.0
     assert process.returncode == 130
-    assert errors == "stopped; run the same command again to go on\n"
+    assert errors == "stopped; run the same command again to resume\n"

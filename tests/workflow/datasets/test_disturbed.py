@@ -139,7 +139,7 @@ def test_interrupt_ends_at_once(tmp_path, undisturbed):
     out, errors = process.communicate(timeout=30)
     assert time.monotonic() - begin < 4.0
     assert process.returncode == 130
-    assert errors.splitlines() == ["stopped; run the same command again to go on"]
+    assert errors.splitlines() == ["stopped; run the same command again to resume"]
     assert out == ""
     complete(tmp_path)
     assert contents(tmp_path) == undisturbed
@@ -154,7 +154,7 @@ def test_interrupt_over_a_cluster(tmp_path, undisturbed, cluster):
     _, errors = process.communicate(timeout=30)
     assert time.monotonic() - begin < 5.0
     assert process.returncode == 130
-    assert errors.splitlines()[-1] == "stopped; run the same command again to go on"
+    assert errors.splitlines()[-1] == "stopped; run the same command again to resume"
     complete(tmp_path)
     assert contents(tmp_path) == undisturbed
 

@@ -17,9 +17,9 @@ app = typer.Typer(
 _Dataset = Annotated[Path, typer.Argument(help="Dataset (netCDF).")]
 
 
-@verb(app, needs=("simulate", "data"))
+@verb(app, needs=("simulate", "data"), example="dataset check data/paper/1.2.0/data.nc")
 def check(screen: Screen, dataset: _Dataset) -> Mapping[str, Any]:
-    """Check a dataset against the format and report all faults (exit code 4 if there are any)."""
+    """Check a dataset against the format and report all faults (exit code 4 if any)."""
     from castblast.stages.datasets.dataset import check_dataset
 
     with screen.progress("check") as progress:
@@ -33,15 +33,20 @@ def check(screen: Screen, dataset: _Dataset) -> Mapping[str, Any]:
     return {"dataset": str(dataset), "faults": faults}
 
 
-@verb(app, needs=("simulate", "data"))
+@verb(app, needs=("simulate", "data"), example="dataset describe data/paper/1.2.0/data.nc")
 def describe(screen: Screen, dataset: _Dataset) -> Mapping[str, Any]:
-    """Say what a dataset holds: size, ranges, failures, versions."""
+    """Summarise a dataset: size, ranges, failures, versions."""
     from castblast.stages.datasets.dataset import describe_dataset
 
     return screen.show(describe_dataset(dataset))
 
 
-@verb(app, needs=("simulate", "data"), compiles="nearfield")
+@verb(
+    app,
+    needs=("simulate", "data"),
+    compiles="nearfield",
+    example="dataset reproduce data/paper/1.2.0/data.nc --sample 7",
+)
 def reproduce(
     screen: Screen,
     dataset: _Dataset,
@@ -53,7 +58,12 @@ def reproduce(
     return screen.show(reproduce_sample(dataset, sample))
 
 
-@verb(app, needs=("simulate", "data"), compiles="nearfield")
+@verb(
+    app,
+    needs=("simulate", "data"),
+    compiles="nearfield",
+    example="dataset extend data/paper/1.2.0/data.nc --design next.csv",
+)
 def extend(
     screen: Screen,
     dataset: _Dataset,
@@ -63,7 +73,7 @@ def extend(
     design: Annotated[
         Path | None,
         typer.Option(
-            help="CSV of the samples instead, such as castblast infill writes; all for training.",
+            help="CSV of designs instead, as written by castblast infill; all become training rows.",
             show_default=False,
         ),
     ] = None,
@@ -93,13 +103,20 @@ def extend(
     return screen.show(outcome)
 
 
-@verb(app, needs=("simulate", "data"))
+@verb(
+    app,
+    needs=("simulate", "data"),
+    example="dataset diff data/paper/1.1.0/data.nc data/paper/1.2.0/data.nc",
+)
 def diff(
     screen: Screen,
     first: Annotated[Path, typer.Argument(help="Dataset (netCDF).")],
-    second: Annotated[Path, typer.Argument(help="Another one, by the same ids.")],
+    second: Annotated[Path, typer.Argument(help="Dataset to compare it with, row by row by id.")],
 ) -> Mapping[str, Any]:
-    """Say in what two datasets differ (exit code 4 if they do): making, variables, rows, values."""
+    """Report differences between two datasets (exit code 4 if any).
+
+    Compares provenance, variables, rows and values.
+    """
     from castblast.stages.datasets.diff import diff_datasets
 
     with screen.progress("diff") as progress:
@@ -107,16 +124,20 @@ def diff(
     return screen.show(outcome)
 
 
-@verb(app, needs=("simulate", "data"))
+@verb(
+    app,
+    needs=("simulate", "data"),
+    example="dataset export data/paper/1.2.0/data.nc --to csv,parquet",
+)
 def export(
     screen: Screen,
     dataset: _Dataset,
     to: Annotated[
-        str, typer.Option(help="Formats, with commas between: csv, parquet.", metavar="FORMATS")
+        str, typer.Option(help="Formats, separated by commas: csv, parquet.", metavar="FORMATS")
     ] = "csv",
     out: OutFolder = None,
 ) -> Mapping[str, Any]:
-    """Write the rows as CSV or Parquet for other tools, with a Croissant record beside them."""
+    """Write the rows as CSV or Parquet for other tools, with a Croissant metadata file."""
     from castblast.stages.datasets.export import export_dataset
 
     return screen.show(export_dataset(dataset, to.split(","), out))

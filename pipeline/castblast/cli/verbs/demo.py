@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from castblast.cli.options import Workers
+from castblast.cli.options import START, Workers
 from castblast.cli.screen import Screen
 from castblast.cli.verb import verb
 
@@ -17,9 +17,14 @@ def demo(
         "demo"
     ),
     workers: Workers = None,
-    restart: Annotated[bool, typer.Option("--restart", help="Discard earlier results.")] = False,
+    restart: Annotated[
+        bool, typer.Option("--restart", help="Discard existing results and start over.")
+    ] = False,
 ) -> Mapping[str, Any]:
-    """Dataset, surrogate, export, prediction and muckpile; a second run reuses what is valid."""
+    """Run the whole chain at a small size; a second run reuses valid results.
+
+    Dataset, surrogate, export, prediction and muckpile, ending in one report.
+    """
     from castblast.stages.demo.run import STEPS, make_demo, next_commands, summarise
 
     job = make_demo(out, workers=workers, restart=restart)
@@ -36,4 +41,10 @@ def demo(
 
 def add_to(app: typer.Typer) -> None:
     """Register the verb."""
-    verb(app, needs=("simulate", "data", "train", "plot", "export"), compiles="nearfield")(demo)
+    verb(
+        app,
+        needs=("simulate", "data", "train", "plot", "export"),
+        compiles="nearfield",
+        panel=START,
+        example="demo --out demo",
+    )(demo)

@@ -13,16 +13,16 @@ app = typer.Typer(help="The catalogue of explosives and their checks.", no_args_
 
 #: What `show` prints: unit for people and factor from SI.
 _SHOWN = {
-    "density": ("kg m-3", 1.0),
-    "detonation_velocity": ("m s-1", 1.0),
-    "in_hole_velocity_150_mm": ("m s-1", 1.0),
-    "heat_of_explosion": ("MJ kg-1", 1e-6),
-    "total_energy": ("MJ l-1", 1e-9),
-    "energy_at_explosion_state": ("MJ l-1", 1e-9),
+    "density": ("kg/m3", 1.0),
+    "detonation_velocity": ("m/s", 1.0),
+    "in_hole_velocity_150_mm": ("m/s", 1.0),
+    "heat_of_explosion": ("MJ/kg", 1e-6),
+    "total_energy": ("MJ/l", 1e-9),
+    "energy_at_explosion_state": ("MJ/l", 1e-9),
     "cj_pressure": ("GPa", 1e-9),
     "explosion_pressure": ("GPa", 1e-9),
     "constant_volume_pressure": ("GPa", 1e-9),
-    "work": ("MJ kg-1", 1e-6),
+    "work": ("MJ/kg", 1e-6),
     "relative_volume": ("1", 1.0),
     "exponent": ("1", 1.0),
 }
@@ -30,7 +30,7 @@ _SHOWN = {
 _Name = Annotated[str, typer.Argument(help="Name in the catalogue, or an explosive file.")]
 
 
-@verb(app, "list")
+@verb(app, "list", example="explosive list")
 def list_(screen: Screen) -> Mapping[str, Any]:
     """List the explosives that come with castblast."""
     from castblast.api.catalogue import catalogue
@@ -53,9 +53,9 @@ def list_(screen: Screen) -> Mapping[str, Any]:
     return {"explosives": entries}
 
 
-@verb(app, needs=("simulate",))
+@verb(app, needs=("simulate",), example="explosive show anfo")
 def show(screen: Screen, name: _Name) -> Mapping[str, Any]:
-    """Show one explosive: states, energies, where its numbers come from."""
+    """Show one explosive: states, energies and sources."""
     from castblast.stages.explosives import describe
 
     description = describe(name)
@@ -81,9 +81,9 @@ def _parts(value: float | Mapping[str, float] | None) -> list[tuple[str, float]]
     return list(value.items()) if isinstance(value, Mapping) else [("", value)]
 
 
-@verb(app, needs=("simulate",))
+@verb(app, needs=("simulate",), example="explosive check mine/explosives/anfo.yaml")
 def check(screen: Screen, name: _Name) -> Mapping[str, Any]:
-    """Check that an explosive's numbers belong together (exit code 4 if they do not)."""
+    """Check that an explosive's numbers are consistent (exit code 4 if not)."""
     from castblast.stages.explosives import check_explosive
 
     return screen.show(check_explosive(name))

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from castblast.cli.options import AllowCode
+from castblast.cli.options import DATA, AllowCode
 from castblast.cli.screen import Screen
 from castblast.cli.verb import verb
 
@@ -17,10 +17,10 @@ def infill(
     model: Annotated[Path, typer.Argument(help="Model spec (YAML) or a fit of castblast train.")],
     rows: Annotated[int, typer.Option(min=1, help="Designs to choose.")] = 500,
     out: Annotated[Path, typer.Option(help="Design file (CSV).")] = Path("next.csv"),
-    members: Annotated[int, typer.Option(min=2, help="Fits that are to disagree.")] = 3,
+    members: Annotated[int, typer.Option(min=2, help="Ensemble members.")] = 3,
     allow_code: AllowCode = False,
 ) -> Mapping[str, Any]:
-    """Choose the designs where fits of the model disagree most, for `dataset extend --design`."""
+    """Select the designs an ensemble disagrees on most, for `dataset extend --design`."""
     from castblast.stages.datasets.infill import infill as run
 
     with screen.progress("infill") as progress:
@@ -32,4 +32,10 @@ def infill(
 
 def add_to(app: typer.Typer) -> None:
     """Register the verb."""
-    verb(app, needs=("simulate", "data", "train"), compiles="nearfield")(infill)
+    verb(
+        app,
+        needs=("simulate", "data", "train"),
+        compiles="nearfield",
+        panel=DATA,
+        example="infill data/paper/1.2.0/data.nc levenberg --rows 500",
+    )(infill)

@@ -1,4 +1,4 @@
-"""`castblast muckpile`: throw a bench with the discrete-element model."""
+"""`castblast muckpile`: cast a bench with the discrete-element model."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from castblast.cli.options import OutFolder
+from castblast.cli.options import PILES, OutFolder
 from castblast.cli.screen import Screen
 from castblast.cli.verb import verb
 from castblast.errors import SpecError
@@ -33,7 +33,7 @@ _Flitch = Annotated[
 def muckpile(
     screen: Screen,
     bench: Annotated[
-        str, typer.Argument(help="Bench file (YAML), or the name of one that comes with castblast.")
+        str, typer.Argument(help="Bench file (YAML), or the name of one that ships with castblast.")
     ],
     out: OutFolder = None,
     balls: Annotated[
@@ -48,32 +48,37 @@ def muckpile(
     velocity: Annotated[
         str | None,
         typer.Option(
-            help='Burden velocity instead of the file\'s, "12.7 m/s".', show_default=False
+            help='Burden velocity, "12.7 m/s" (overrides the bench file).', show_default=False
         ),
     ] = None,
     precision: Annotated[
         str | None,
         typer.Option(
-            metavar="mixed|float64", help="Instead of that of the file.", show_default=False
+            metavar="mixed|float64",
+            help="Precision (overrides the bench file).",
+            show_default=False,
         ),
     ] = None,
     sleeping: Annotated[
         bool | None,
         typer.Option(
             "--sleeping/--no-sleeping",
-            help="Leave out balls at rest; instead of what the file says.",
+            help="Skip balls at rest (overrides the bench file).",
             show_default=False,
         ),
     ] = None,
     packings: Annotated[
         Path | None,
         typer.Option(
-            help="Folder of packings to use again and to add to; default: in the output folder.",
+            help="Folder of packings to reuse and add to; default: in the output folder.",
             show_default=False,
         ),
     ] = None,
     seeds: Annotated[
-        int, typer.Option(min=1, help="Runs with so many seeds; bands over them.")
+        int,
+        typer.Option(
+            min=1, help="Repeat with this many seeds; report mean and standard deviation."
+        ),
     ] = 1,
     ore: _Ore = None,
     dig_block: _DigBlock = None,
@@ -92,7 +97,7 @@ def muckpile(
         Path | None,
         typer.Option(
             metavar="DIR",
-            help="Write the packed bench as input for LAMMPS instead of throwing it.",
+            help="Write the packed bench as input for LAMMPS instead of running it.",
             show_default=False,
         ),
     ] = None,
@@ -101,7 +106,7 @@ def muckpile(
         typer.Option(metavar="DIR", help="The same for LIGGGHTS.", show_default=False),
     ] = None,
 ) -> Mapping[str, Any]:
-    """Pack, fire and settle a bench; writes final state, profile, pictures and metrics."""
+    """Pack, fire and settle a bench; write final state, profile, pictures and metrics."""
     from castblast.stages.muckpile.compare import run_seeds
     from castblast.stages.muckpile.deck import Decks
     from castblast.stages.muckpile.extras import Extras
@@ -141,7 +146,7 @@ def compare_muckpiles(
     folders: Annotated[list[Path], typer.Argument(help="Folders of finished muckpile runs.")],
     out: OutFolder = None,
 ) -> Mapping[str, Any]:
-    """Compare finished muckpiles: mean and scatter of every metric, profiles over each other."""
+    """Compare finished muckpiles: mean and scatter of every metric, overlaid profiles."""
     from castblast.stages.muckpile.compare import compare_runs
 
     return screen.show(compare_runs(folders, Path() if out is None else out))
@@ -166,7 +171,7 @@ def measure_muckpile(
     dig_block: _DigBlock = None,
     flitch: _Flitch = None,
 ) -> Mapping[str, Any]:
-    """Measure what another engine threw: throw, profile and ore from its final balls."""
+    """Measure another engine's muckpile: throw, profile and ore from its final balls."""
     from castblast.stages.muckpile.extras import Extras
     from castblast.stages.muckpile.measure import measure_muckpile as measure
 
@@ -176,6 +181,10 @@ def measure_muckpile(
 
 def add_to(app: typer.Typer) -> None:
     """Register the verbs."""
-    verb(app, needs=("simulate", "plot"), compiles="muckpile")(muckpile)
-    verb(app, needs=("simulate", "plot"))(measure_muckpile)
-    verb(app, needs=("simulate", "plot"))(compare_muckpiles)
+    needs = ("simulate", "plot")
+    example = "muckpile demo --balls 2000 --out muckpile"
+    verb(app, needs=needs, compiles="muckpile", panel=PILES, example=example)(muckpile)
+    example = "measure-muckpile demo deck/final.dump --out measured"
+    verb(app, needs=needs, panel=PILES, example=example)(measure_muckpile)
+    example = "compare-muckpiles muckpile other_muckpile"
+    verb(app, needs=needs, panel=PILES, example=example)(compare_muckpiles)

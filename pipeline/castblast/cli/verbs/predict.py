@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from castblast.cli.options import Settings
+from castblast.cli.options import BLAST, Settings
 from castblast.cli.screen import Screen
 from castblast.cli.verb import verb
 
@@ -15,7 +15,9 @@ _Quantity = Annotated[str | None, typer.Option(metavar='"VALUE UNIT"', show_defa
 
 def predict(
     screen: Screen,
-    explosive: Annotated[str, typer.Option(help="Explosive the network knows.")] = "anfo",
+    explosive: Annotated[
+        str, typer.Option(help="An explosive the network was trained on.")
+    ] = "anfo",
     burden: _Quantity = None,
     bench_height: _Quantity = None,
     hole_diameter: _Quantity = None,
@@ -27,7 +29,8 @@ def predict(
     csv: Annotated[
         Path | None,
         typer.Option(
-            help="Designs as CSV, one a row; heads like 'burden [m]'.", show_default=False
+            help="Designs as CSV, one per row; column headers like 'burden [m]'.",
+            show_default=False,
         ),
     ] = None,
     network: Annotated[
@@ -37,8 +40,8 @@ def predict(
     """Predict equilibrium pressure, hole expansion, crushed zone and burden velocity.
 
     Inputs that are not given take their defaults. Every value comes with its prediction band, from
-    the 5th to the 95th percentile of blasts, a prior before calibration. A design outside training
-    data, or unusual among it, is called so, and the inputs at fault are named.
+    the 5th to the 95th percentile of blasts, a prior before calibration. Designs outside or at the
+    edge of the training data are flagged, with the inputs responsible.
     """
     from castblast.specs.case import parse_values, split_assignments
     from castblast.stages.predict import predict_design
@@ -68,4 +71,5 @@ def predict(
 
 def add_to(app: typer.Typer) -> None:
     """Register the verb."""
-    verb(app)(predict)
+    example = 'predict --explosive anfo --burden "4 m" --hole-diameter "150 mm" --ucs "80 MPa"'
+    verb(app, panel=BLAST, example=example)(predict)

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from castblast.cli.options import ExplosiveName, OutFolder, Settings
+from castblast.cli.options import BLAST, ExplosiveName, OutFolder, Settings
 from castblast.cli.screen import Screen
 from castblast.cli.verb import verb
 
@@ -35,11 +35,11 @@ def simulate(
     ] = None,
     explosive: ExplosiveName = None,
     mode: Annotated[
-        _Mode | None, typer.Option(help="End of the near-field run.", show_default="equilibrium")
+        _Mode | None, typer.Option(help="When the near-field run ends.", show_default="equilibrium")
     ] = None,
     tension: Annotated[
         _Tension | None,
-        typer.Option(help="Rock that yields in tension.", show_default="ductile"),
+        typer.Option(help="Behaviour of rock that yields in tension.", show_default="ductile"),
     ] = None,
     parameter_set: Annotated[
         _ParameterSet | None,
@@ -72,4 +72,5 @@ def simulate(
 
 def add_to(app: typer.Typer) -> None:
     """Register the verb."""
-    verb(app, needs=("simulate",), compiles="nearfield")(simulate)
+    example = 'simulate --explosive anfo --set burden="4 m" --set ucs="80 MPa" --out simulation'
+    verb(app, needs=("simulate",), compiles="nearfield", panel=BLAST, example=example)(simulate)

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from castblast.cli.options import START
 from castblast.cli.screen import Screen
 from castblast.cli.verb import verb
 
@@ -27,7 +28,7 @@ def inputs(
 ) -> Mapping[str, Any]:
     """List the inputs of a blast with unit, default and plausible range.
 
-    Where no default is shown, it follows from other inputs, as the last column says.
+    Where no default is shown, it is derived from other inputs; see the last column.
     """
     from castblast.stages.inputs import HEADER, input_rows, list_inputs
 
@@ -49,5 +50,5 @@ def examples(
 
 def add_to(app: typer.Typer) -> None:
     """Register the verbs."""
-    verb(app)(inputs)
-    verb(app)(examples)
+    verb(app, panel=START, example="inputs rock")(inputs)
+    verb(app, panel=START, example="examples mine")(examples)

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from castblast.cli.options import AllowCode, OutFolder
+from castblast.cli.options import MODELS, AllowCode, OutFolder
 from castblast.cli.screen import Screen
 from castblast.cli.verb import verb
 
@@ -15,7 +15,7 @@ _Tracking = Annotated[
     bool | None,
     typer.Option(
         "--tracking/--no-tracking",
-        help="Keep a record of the runs in MLflow; default: if MLflow is installed.",
+        help="Record runs in MLflow; default: if MLflow is installed.",
         show_default=False,
     ),
 ]
@@ -25,7 +25,7 @@ _Workers = Annotated[
     typer.Option(
         "--workers",
         min=1,
-        help="Fits at a time, each a process; default: all cores.",
+        help="Fits in parallel, one process each; default: all cores.",
         show_default=False,
     ),
 ]
@@ -45,7 +45,7 @@ def train(
     runs: _Runs = _RUNS,
     allow_code: AllowCode = False,
 ) -> Mapping[str, Any]:
-    """Fit models and score them on rows never trained on; fits that are there stay."""
+    """Fit models and score them on held-out rows; existing fits are kept."""
     from castblast.stages.training.train import train as run
 
     with screen.progress("train") as progress:
@@ -68,7 +68,7 @@ def tune(
     spec: Annotated[Path, typer.Argument(help="Model spec (YAML) with a block 'search'.")],
     trials: Annotated[
         int | None,
-        typer.Option(help="Trials in total, earlier ones included.", show_default=False),
+        typer.Option(help="Total number of trials, including earlier ones.", show_default=False),
     ] = None,
     timeout: Annotated[
         float | None,
@@ -79,12 +79,12 @@ def tune(
         typer.Option(help="File of the study; default: in the folder.", show_default=False),
     ] = None,
     out: OutFolder = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the sampler.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of the sampler.")] = 0,
     tracking: _Tracking = None,
     runs: _Runs = _RUNS,
     allow_code: AllowCode = False,
 ) -> Mapping[str, Any]:
-    """Search the settings that a spec declares; a study that was stopped goes on."""
+    """Tune the hyperparameters a spec declares; resumes an interrupted study."""
     from castblast.stages.training.tune import tune as run
 
     with screen.progress("tune") as progress:
@@ -129,9 +129,10 @@ def compare(
     runs: _Runs = _RUNS,
     allow_code: AllowCode = False,
 ) -> Mapping[str, Any]:
-    """Rank models on rows never trained on, ask them for physics, choose one (exit code 4: none).
+    """Rank models on held-out rows and select one (exit code 4: none qualifies).
 
-    What is fitted already is not fitted again, so a comparison that was stopped goes on.
+    Models are checked against physical constraints. Existing fits are reused; an interrupted
+    comparison resumes.
     """
     from castblast.api.training.judging import FULL, QUICK
     from castblast.stages.comparison.run import compare as run
@@ -156,7 +157,7 @@ def runs(
     screen: Screen,
     folder: Annotated[Path, typer.Argument(help="Folder of the MLflow record.")] = _RUNS,
     experiment: Annotated[
-        str | None, typer.Option(help="Only this one, e.g. paper/1.", show_default=False)
+        str | None, typer.Option(help="Only this experiment, e.g. paper/1.", show_default=False)
     ] = None,
     stage: Annotated[
         str | None,
@@ -166,7 +167,7 @@ def runs(
         str | None,
         typer.Option(help="Sort by a metric, e.g. valid_error, best first.", show_default=False),
     ] = None,
-    limit: Annotated[int, typer.Option(min=0, help="At most so many; 0: all.")] = 30,
+    limit: Annotated[int, typer.Option(min=0, help="Show at most this many; 0: all.")] = 30,
 ) -> Mapping[str, Any]:
     """List the recorded runs, newest first."""
     from castblast.stages.training.runs import list_runs
@@ -201,7 +202,7 @@ def export(
         ),
     ] = None,
 ) -> Mapping[str, Any]:
-    """Write the network for other tools and prove that it gives the same numbers."""
+    """Write the network for other tools and verify that it gives the same numbers."""
     from castblast.stages.export import export as run
 
     with screen.progress("export") as progress:
@@ -222,5 +223,12 @@ def _is_tracked(screen: Screen, wanted: bool | None) -> bool:
 
 def add_to(app: typer.Typer) -> None:
     """Register the verbs."""
-    for function in (train, tune, compare, runs, export):
-        verb(app)(function)
+    examples = {
+        train: "train data/paper/1.2.0/data.nc levenberg",
+        tune: "tune data/paper/1.2.0/data.nc torch_mlp --trials 40",
+        compare: "compare data/paper/1.2.0/data.nc --quick",
+        runs: "runs --stage compare --sort valid_error",
+        export: "export data/paper/1.2.0/comparison --to json,c",
+    }
+    for function, example in examples.items():
+        verb(app, panel=MODELS, example=example)(function)

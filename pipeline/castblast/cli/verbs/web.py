@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
+from castblast.cli.options import START
 from castblast.cli.screen import Screen
 from castblast.cli.verb import verb
 
@@ -18,7 +19,7 @@ def web(
     ] = None,
     browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
 ) -> Mapping[str, Any]:
-    """Open the web page that comes with castblast; it works without a network."""
+    """Open the web page that ships with castblast; it works offline."""
     from castblast.stages.web import shipped_page
 
     page = shipped_page(out).resolve()
@@ -33,4 +34,4 @@ def web(
 
 def add_to(app: typer.Typer) -> None:
     """Register the verb."""
-    verb(app)(web)
+    verb(app, panel=START, example="web --out blast.html")(web)
