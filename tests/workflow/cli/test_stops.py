@@ -16,7 +16,7 @@ pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 #: The command line, which says when a near field has begun.
 SIMULATE = """
 import sys
-import castblast.stages.simulate as stage
+import castblast.api.simulation as stage
 from castblast.cli import main
 run = stage.run_blast
 def announced(case):

@@ -73,7 +73,7 @@ def extend(
     design: Annotated[
         Path | None,
         typer.Option(
-            help="CSV of designs instead, as written by castblast infill; all become training rows.",
+            help="CSV of designs instead, as castblast infill writes it; all become training rows.",
             show_default=False,
         ),
     ] = None,
