@@ -8,7 +8,7 @@ import typer
 
 from castblast.cli.options import MODELS, AllowCode, OutFolder
 from castblast.cli.screen import Screen
-from castblast.cli.verb import verb
+from castblast.cli.verb import Verb, verb
 
 _Dataset = Annotated[Path, typer.Argument(help="Dataset (netCDF).")]
 _Tracking = Annotated[
@@ -223,7 +223,7 @@ def _is_tracked(screen: Screen, wanted: bool | None) -> bool:
 
 def add_to(app: typer.Typer) -> None:
     """Register the verbs."""
-    examples = {
+    examples: dict[Verb, str] = {
         train: "train data/paper/1.2.0/data.nc levenberg",
         tune: "tune data/paper/1.2.0/data.nc torch_mlp --trials 40",
         compare: "compare data/paper/1.2.0/data.nc --quick",
