@@ -245,7 +245,7 @@ def fit_title(fit: Fit) -> str:
     """Name and description of a fit, and its rows on a second line."""
     what = f" ({fit.spec.description})" if fit.spec.description else ""
     train, test = len(fit.table.rows("train")), len(fit.table.rows("test"))
-    return f"{fit.spec.name}{what}\n{train:,} training rows, {test:,} test rows never trained on"
+    return f"{fit.spec.name}{what}\n{train:,} training rows, {test:,} held-out test rows"
 
 
 def held_out(fit: Fit) -> HeldOutRows:

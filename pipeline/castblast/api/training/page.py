@@ -58,7 +58,7 @@ def write_page(path: Path, document: ComparisonDocument, files: Sequence[Path]) 
         f"Models of dataset {source.get('name', '(unnamed)')} "
         f"{source.get('dataset_version', '')} (content "
         f"{source.get('content_sha256', 'unknown')[:12]}), judged on {document['test_rows']:,} "
-        f"test rows never trained on. Made by castblast {__version__}."
+        f"held-out test rows. Made by castblast {__version__}."
     )
     shown = [section for section in sections if section is not None]
     return write_report(path, "castblast: comparison of models", lead, shown)

@@ -38,7 +38,7 @@ def outcome(found: Comparison, document: Mapping[str, Any], out: Path) -> Outcom
     if paper["target"] == first:
         published = [f"{paper['r2']:.4f}", f"{paper['relative_error_95']:.1%}"]
         rows.append([f"paper, {paper['runs']:,} runs", "", "", *published, *("" for _ in others)])
-    title = f"{league['test_rows']:,} test rows never trained on"
+    title = f"{league['test_rows']:,} held-out test rows"
     return Outcome(
         document={**document, "out": str(out)},
         title=title,

@@ -37,7 +37,7 @@ def train(
     allow_code: bool = False,
     progress: ProgressCallback = silent,
 ) -> Outcome:
-    """Fit every spec and score it on rows never trained on; fits that are there stay.
+    """Fit every spec and score it on held-out rows; existing fits are kept.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def _outcome(fits: Sequence[Fit], out: Path) -> Outcome:
             for name in targets
         ]
         rows.append([fit.spec.name, f"{len(fit.table.rows('train')):,}", *cells])
-    title = f"{len(fits[0].table.rows('test')):,} test rows never trained on"
+    title = f"{len(fits[0].table.rows('test')):,} held-out test rows"
     document = {
         "out": str(out),
         "fits": {fit.spec.name: fit.to_document() for fit in fits},
