@@ -18,7 +18,7 @@ from study_cases import draw_cases
 from castblast.blast.run import BlastCase
 from castblast.disk.files import write_text
 from castblast.nearfield.march import Annulus
-from castblast.nearfield.mesh import EQUILIBRIUM_REACH, EQUILIBRIUM_ZONES, WALL_SPLIT as FRONT_ZONES
+from castblast.nearfield.setup import EQUILIBRIUM_REACH, EQUILIBRIUM_ZONES, FRONT_ZONES
 
 SEED, DRAWN = 31, 800
 REFERENCE_ZONES = 2400

@@ -25,13 +25,15 @@ from castblast.errors import Status
 from castblast.explosive.isentrope import pressure
 from castblast.nearfield.case import NearFieldSettings
 from castblast.nearfield.march import Annulus, March, march
-from castblast.nearfield.mesh import (
-    EQUILIBRIUM_REACH,
-    EQUILIBRIUM_ZONES,
-    WALL_SPLIT as FRONT_ZONES,
-)
 from castblast.nearfield.outcome import STATE_NAMES, WINDOW, end_state, mean_over
-from castblast.nearfield.setup import EQUILIBRIUM_RADII
+from castblast.nearfield.setup import (
+    EQUILIBRIUM_RADII,
+    EQUILIBRIUM_REACH,
+    EQUILIBRIUM_WIDTH,
+    EQUILIBRIUM_ZONES,
+    FRONT_REACH,
+    FRONT_ZONES,
+)
 from castblast.nearfield.solver import _annulus
 from castblast.report.style import CYCLE, GREY, in_style, new_figure, save_figure
 from castblast.types import FloatArray
@@ -319,9 +321,9 @@ def describe_default() -> list[str]:
         f"{EQUILIBRIUM_ZONES} zones to {EQUILIBRIUM_RADII:,.0f} hole radii, of the width",
         "",
         f"    (first + g y) (1 + y / {EQUILIBRIUM_REACH:g})",
-        f"    first = {0:g} (x^2 + 0.3^2)^(1/4) / (1 + (x / 6)^2)^(1/4)",
+        f"    first = {EQUILIBRIUM_WIDTH:g} (x^2 + 0.3^2)^(1/4) / (1 + (x / 6)^2)^(1/4)",
         "",
-        f"and in rock that yields in the wave front {FRONT_ZONES} zones, with {0:g} in "
+        f"and in rock that yields in the wave front {FRONT_ZONES} zones, with {FRONT_REACH:g} in "
         f"place of {EQUILIBRIUM_REACH:g}",
     ]
 

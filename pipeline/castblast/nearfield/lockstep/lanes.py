@@ -50,7 +50,7 @@ _ZONE_ROWS: Final = 17
 BLOCK: Final = _ZONE_ROWS * LANES
 
 # Rows of what a lane has once: constants, the step, sums; then scratch of the zone at hand.
-_LANE_ROWS: Final = 45
+_LANE_ROWS: Final = 44
 (
     FRICTION, DILATION, LAME, TWICE_SHEAR, STIFFNESS, SHEAR_COMPLIANCE, TENSILE_COMPLIANCE,
     SHEAR_STRAIN, UCS, DENSITY, LINEAR, QUADRATIC, BRITTLE, ACTIVE, KICK, STEP, PER_SECOND,
@@ -58,7 +58,6 @@ _LANE_ROWS: Final = 45
     NEW_PER_AREA, RADIAL_STRAIN, HOOP_STRAIN, NEW_RADIAL, NEW_HOOP, NEW_AXIAL, FLOW_SHEAR,
     FLOW_OPENING, FLOW_SHEAR_WORK, FLOW_TENSILE_WORK, FLOW_STRAIN, NOW_UCS, NOW_TENSION,
     SHEAR_SHORTFALL, TENSILE_SHORTFALL, UNSOLVED, LAST, BEFORE, HERE,
-    KICKED,
 ) = (row * LANES for row in range(_LANE_ROWS))  # fmt: skip
 
 
@@ -77,7 +76,7 @@ class EdgeModels(NamedTuple):
 
 @kernel
 def lane_array_sizes(zones: int) -> tuple[int, int]:
-    """Lengths of the array of so many zones in motion and of that of the lanes.
+    """Lengths of the array of the zones and of that of the lanes.
 
     The last zone has an outer node and looks at the compression of a zone beyond it.
     """
@@ -90,12 +89,15 @@ def kick_and_move(zones: FloatArray, lanes: FloatArray, nodes: int) -> None:
     for j in range(nodes):
         block = j * BLOCK
         for lane in range(LANES):
-            velocity, force = zones[block + VELOCITY + lane], zones[block + FORCE + lane]
-            gained = lanes[KICK + lane] * force * zones[block + PER_MASS + lane]
-            kicked = velocity + gained
+            velocity = zones[block + VELOCITY + lane]
+            kicked = (
+                velocity
+                + lanes[KICK + lane]
+                * zones[block + FORCE + lane]
+                * (zones[block + PER_MASS + lane])
+            )
             # The outermost node of a lane with fewer zones has moved with its boundary.
             inside = j < lanes[ACTIVE + lane]
-            lanes[KICKED + lane] += force * gained if inside else 0.0
             zones[block + VELOCITY + lane] = kicked if inside else velocity
             zones[block + RADIUS + lane] += lanes[STEP + lane] * kicked if inside else 0.0
 
@@ -217,7 +219,7 @@ def _flow_and_resist(zones: FloatArray, lanes: FloatArray, j: int) -> None:
         lanes[SHEAR_WORK + lane] += area * shear_work if reached else 0.0
         lanes[TENSILE_WORK + lane] += area * tensile_work if reached else 0.0
         lanes[VISCOUS_WORK + lane] += spent if reached else 0.0
-        zones[here + VISCOUS] = r.viscous if reached else 0.0
+        zones[here + VISCOUS] = r.viscous
         lanes[LIMIT + lane] = min(lanes[LIMIT + lane], r.limit if reached else np.inf)
         fastest = max(abs(d.radial), abs(d.hoop))
         lanes[FASTEST + lane] = max(lanes[FASTEST + lane], fastest if reached else 0.0)
@@ -272,9 +274,9 @@ def _return_to_edges(
 @kernel
 def load_lane(
     zones: FloatArray, lanes: FloatArray, edges: EdgeModels, lane: int, body: Body,
-    material: Material, model: YieldModel, count: int,
+    material: Material, model: YieldModel,
 ) -> None:  # fmt: skip
-    """Put an annulus at time zero into a lane: its constants and its first `count` zones."""
+    """Put an annulus at time zero into a lane."""
     planes = model.planes
     lanes[FRICTION + lane], lanes[DILATION + lane] = planes.friction, planes.dilation
     lanes[LAME + lane], lanes[TWICE_SHEAR + lane] = planes.lame, planes.twice_shear
@@ -293,14 +295,15 @@ def load_lane(
         for i in range(3):
             for j in range(3):
                 edges.inverse[lane, k, i, j] = model.inverse[k, i, j]
-    lanes[LAST + lane] = body.width.size
-    for j in range(count + 1):
+    last = body.width.size
+    lanes[LAST + lane] = last
+    for j in range(last + 1):
         here = j * BLOCK + lane
         zones[here + RADIUS] = body.radius[j]
         zones[here + VELOCITY] = body.velocity[j]
         zones[here + FORCE] = body.force[j]
         zones[here + PER_MASS] = body.per_mass[j]
-        if j == count:
+        if j == last:
             break
         zones[here + WIDTH], zones[here + MEAN] = body.width[j], body.mean_radius[j]
         zones[here + RADIAL], zones[here + HOOP] = body.radial[j], body.hoop[j]
@@ -314,14 +317,15 @@ def load_lane(
 
 
 @kernel
-def unload_lane(zones: FloatArray, lane: int, active: int, body: Body) -> None:
-    """Copy the zones of a lane that are in motion into a body at rest."""
-    for j in range(active + 1):
+def unload_lane(zones: FloatArray, lane: int, body: Body) -> None:
+    """Copy the state of a lane into a body."""
+    last = body.width.size
+    for j in range(last + 1):
         here = j * BLOCK + lane
         body.radius[j] = zones[here + RADIUS]
         body.velocity[j] = zones[here + VELOCITY]
         body.force[j] = zones[here + FORCE]
-        if j == active:
+        if j == last:
             break
         body.width[j], body.mean_radius[j] = zones[here + WIDTH], zones[here + MEAN]
         body.radial[j], body.hoop[j] = zones[here + RADIAL], zones[here + HOOP]

@@ -70,7 +70,7 @@ SHEAR, TENSION, VISCOUS, BOUNDARY, LOAD, RAMP = 0, 1, 2, 3, 4, 5
 LEDGER_SIZE = 6
 
 #: Largest strain of a zone in one step; the work of a step is right to its square.
-STRAIN_STEP = 0.0045
+STRAIN_STEP = 0.0035
 
 
 class Material(NamedTuple):
@@ -176,17 +176,6 @@ def graded_radii(
             nodes[i] = inner + length * i / zones
         return nodes
     share = first / reach
-    q = mesh_growth(length, zones, first, reach)
-    for i in range(count):
-        e = np.expm1(q * i)
-        nodes[i] = inner + first * e / (q - share * e)
-    return nodes
-
-
-@kernel
-def mesh_growth(length: float, zones: float, first: float, reach: float) -> float:
-    """Growth q of `graded_radii` that puts the last node at `length` [m] from the wall."""
-    share = first / reach
     low, high = 1e-12, 4.0
     for _ in range(100):
         q = 0.5 * (low + high)
@@ -194,7 +183,10 @@ def mesh_growth(length: float, zones: float, first: float, reach: float) -> floa
             high = q
         else:
             low = q
-    return q
+    for i in range(count):
+        e = np.expm1(q * i)
+        nodes[i] = inner + first * e / (q - share * e)
+    return nodes
 
 
 @kernel
@@ -235,19 +227,6 @@ def make_body(
         never_sheared.copy(),
         np.zeros(n),
     )
-
-
-@kernel
-def first_zones(body: Body, count: int) -> Body:
-    """The body without the zones beyond the first `count`: views, nothing is copied."""
-    n, b = count + 1, body
-    return Body(
-        b.initial_radius[:n], b.mass[:n], b.per_mass[:n], b.radius[:n], b.velocity[:n],
-        b.force[:n], b.initial_area[:count], b.per_initial_area[:count], b.width[:count],
-        b.mean_radius[:count], b.radial[:count], b.hoop[:count], b.axial[:count],
-        b.viscous[:count], b.tension[:count], b.shear_multiplier[:count],
-        b.tensile_multiplier[:count], b.hoop_multiplier[:count], b.shear_strain[:count],
-    )  # fmt: skip
 
 
 @kernel
