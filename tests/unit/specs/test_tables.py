@@ -148,7 +148,7 @@ FAULTS = {
     "angle": ("x [m],direction [deg]\n1,175.94\n", "175.94 deg: implausible (175.94 deg)"),
     "variable": ("x [m],hole_diameter [m]\n1,3\n", "3 m: implausible (3000 mm); allowed: 20"),
     "of an id": ("hole,x [m]\nH7,nan\n", "line 2 (hole 'H7'): x: nan: a number is needed"),
-    "quotation mark": ('x [m]\n"1\n2\n', "is no CSV: unexpected end of data"),
+    "quotation mark": ('x [m]\n"1\n2\n', "not valid CSV: unexpected end of data"),
     "no text": (b"x [m]\n\x001\n", "holds bytes that are no text; save it as UTF-8"),
     "cut UTF-16": (codecs.BOM_UTF16_LE + b"x\x00[", "is not a text file in UTF-16-LE; save it as"),
     "undefined byte": (b"x [m]\n1\n\x81\n", "is not a text file in UTF-8 or Windows-1252"),
@@ -215,7 +215,7 @@ def test_a_hostile_table_is_one_line_at_once(tmp_path: Path) -> None:
     wide = said(tmp_path, "x," * 200_000 + "x\n1\n")
     assert wide == f"line 1: 200,001 columns; at most {MOST_COLUMNS:,}"
     cell = said(tmp_path, "x [m]\n" + "1" * 200_000 + "\n")
-    assert cell.startswith("line 2: is no CSV: field larger than field limit")
+    assert cell.startswith("line 2: not valid CSV: field larger than field limit")
     assert time.process_time() - start < 10.0
 
 

@@ -251,4 +251,4 @@ def _split(
             yield current, cells
     except csv.Error as fault:
         at = number - 1 + reader.line_num if plain else current
-        raise SpecError(f"{path}: line {at}: is no CSV: {fault}") from None
+        raise SpecError(f"{path}: line {at}: not valid CSV: {fault}") from None

@@ -86,8 +86,8 @@ def _surrogate(folder: Path) -> Section:
         ]
     )
     caption = (
-        f"R² and 95 % quantile of the relative error on {comparison['test_rows']:,} test rows "
-        "never trained on"
+        "R² and 95th-percentile relative error on "
+        f"{comparison['test_rows']:,} held-out test rows"
     )
     figures = [
         Picture(path, f"Learning curve, error histogram, predicted against simulated: {name}")
