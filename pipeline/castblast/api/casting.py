@@ -19,11 +19,10 @@ from castblast.muckpile.results.metrics import pile_metrics
 from castblast.muckpile.results.ore import DigPlan
 from castblast.progress import part
 from castblast.scene.bounds import BallSizes, require_bounds
-from castblast.scene.case import bench_surroundings, cast_case, describe_sizes, require_possible
+from castblast.scene.build import build, read_site
+from castblast.scene.case import describe_sizes
 from castblast.scene.options import with_numerics, with_options
-from castblast.scene.plan import make_plan
-from castblast.scene.start import make_start
-from castblast.specs.bench.ground.spec import Ground, read_ground
+from castblast.specs.bench.ground.spec import Ground
 from castblast.specs.bench.ore import read_ore
 from castblast.specs.quantity import parse_quantity
 from castblast.stopping import deferred_stop
@@ -94,10 +93,8 @@ def cast(
     spec = with_numerics(with_options(opened.spec, balls, velocity), precision, None)
     spec = spec if seed is None else spec.model_copy(update={"seed": int(seed)})
     network = None if model is None else model.network
-    geometry = spec.bench.to_bench()
-    ground = read_ground(spec.ground, opened.folder, geometry)
-    walls = bench_surroundings(spec, geometry, ground)
-    plan = make_plan(spec, geometry, opened.folder, one_speed=velocity is not None, network=network)
+    site = read_site(spec, opened.folder, one_speed=velocity is not None, network=network)
+    geometry, plan = site.bench, site.plan
     polygons = read_ore(opened.folder / spec.ore, geometry, spec.frame) if spec.ore else ()
     interval = _interval(snapshots)
     report, count = reporter(progress), threads or 0
@@ -107,13 +104,17 @@ def cast(
         def limit(sizes: BallSizes) -> None:
             require_bounds(spec, sizes, Path(scratch), count)
 
-        packing = part(report, 0.0, _PACKING_SHARE)
-        start, sizes = make_start(
-            spec, geometry, plan, opened.folder, Path(scratch), count, packing, limit, stop
+        scene = build(
+            spec,
+            site,
+            opened.folder,
+            Path(scratch),
+            threads=count,
+            limit=limit,
+            progress=part(report, 0.0, _PACKING_SHARE),
+            stop=stop,
         )
-        case = cast_case(spec, walls, start.balls, plan, count)
-        require_possible(spec, case, ground)
-        case = case._replace(snapshot_interval=interval)
+        start, case = scene.start, scene.case._replace(snapshot_interval=interval)
         result = run_cast(
             case,
             part(report, _PACKING_SHARE, 1.0),
@@ -127,12 +128,16 @@ def cast(
         )
         raise SimulationError(message)
     metrics = pile_metrics(
-        start.balls, result.particles, geometry, block_velocity=case.block_velocity, walls=walls
+        start.balls,
+        result.particles,
+        geometry,
+        block_velocity=case.block_velocity,
+        walls=case.walls,
     )
     ore = follow_ore(polygons, DigPlan(block=geometry.spacing), case, result)
     document = run_document(spec, plan.speed, plan.prediction, start, result, metrics, ore)
-    document |= {"fragments": describe_sizes(sizes), **bench_content(spec, opened.folder)}
-    document |= _ground_remarks(ground)
+    document |= {"fragments": describe_sizes(scene.sizes), **bench_content(spec, opened.folder)}
+    document |= _ground_remarks(site.ground)
     report(1.0, f"{result.time:.1f} s simulated")
     return Muckpile(
         Run(

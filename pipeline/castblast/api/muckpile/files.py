@@ -19,8 +19,9 @@ from castblast.api.muckpile.tables import (
     profile_columns,
 )
 from castblast.disk.files import write_csv, write_json, write_with
+from castblast.muckpile.bench.geometry import Bench
 from castblast.muckpile.cast.solver import CastCase, CastResult
-from castblast.muckpile.results.profile import mean_profile
+from castblast.muckpile.results.profile import HeightField, mean_profile
 from castblast.specs.bench.bench import BenchSpec
 
 #: Files that some runs write and others do not: they never stay beside those of another run.
@@ -72,11 +73,16 @@ def write_results(
         write_csv(folder / "blocks.csv", block_columns(case, after, bench, label)),
         write_json(folder / "metrics.json", timeless),
     ]
-    return files + _draw(folder, spec, case, result, ore)
+    return files + _draw(folder, bench, surface, case, result, ore)
 
 
 def _draw(
-    folder: Path, spec: BenchSpec, case: CastCase, result: CastResult, ore: OreRun | None
+    folder: Path,
+    bench: Bench,
+    surface: HeightField,
+    case: CastCase,
+    result: CastResult,
+    ore: OreRun | None,
 ) -> list[Path]:
     """Draw all pictures of a run."""
     from castblast.report.piles.movement_figures import draw_movement, draw_ore, draw_profiles
@@ -88,9 +94,7 @@ def _draw(
     )
     from castblast.report.piles.muckpile_view import draw_view
 
-    bench, walls = spec.bench.to_bench(), case.walls
-    before, after = case.particles, result.particles
-    surface = pile_surface(before, after, bench, walls)
+    walls, before, after = case.walls, case.particles, result.particles
     sections = pile_sections(surface, bench)
     mean, y = mean_profile(surface), middle_section(before, bench)
     spread = surface.height.std(axis=0)

@@ -35,11 +35,10 @@ from castblast.muckpile.results.ore import move_ore
 from castblast.muckpile.results.profile import HeightField, Profile, mean_profile
 from castblast.report.piles.movement_figures import draw_movement, draw_ore, draw_profiles
 from castblast.report.piles.muckpile_figures import draw_plan, draw_section
-from castblast.scene.case import bench_surroundings
-from castblast.scene.plan import Plan, make_plan
+from castblast.scene.build import read_site
+from castblast.scene.plan import Plan
 from castblast.specs.bench.balls.files import read_balls
 from castblast.specs.bench.bench import BenchSpec, load_bench
-from castblast.specs.bench.ground.spec import read_ground
 from castblast.stages.muckpile.extras import Extras, read_extras
 from castblast.stages.outcome import Outcome
 
@@ -114,9 +113,8 @@ def measure_muckpile(
     geometry = spec.bench.to_bench()
     ore_of_bench = path.parent / spec.ore if spec.ore else None
     wanted = read_extras(extras, geometry, ore_of_bench, spec.frame)
-    around = read_ground(spec.ground, path.parent, geometry)
-    walls = bench_surroundings(spec, geometry, around)
-    plan = make_plan(spec, geometry, path.parent)
+    site = read_site(spec, path.parent)
+    walls, plan = site.walls, site.plan
     before_file = _start_file(spec, path.parent, final, start)
     law = spec.contact.to_law()
     before, after = read_balls(before_file, law), read_balls(final, law)
@@ -132,19 +130,19 @@ def measure_muckpile(
         ore = OreRun(wanted.ore, wanted.plan, moved)
     surface = pile_surface(before, after, geometry, walls)
     found = _Measured(
-        spec,
-        geometry,
-        case,
-        after,
-        plan,
-        surface,
-        pile_sections(surface, geometry),
-        ground_profile(surface, geometry, walls),
-        ore,
+        spec=spec,
+        bench=geometry,
+        case=case,
+        after=after,
+        plan=plan,
+        surface=surface,
+        sections=pile_sections(surface, geometry),
+        ground=ground_profile(surface, geometry, walls),
+        ore=ore,
     )
     document = _document(found, {"start": before_file, "final": final})
-    if around.remarks:
-        document |= {"ground_remarks": list(around.remarks)}
+    if site.ground.remarks:
+        document |= {"ground_remarks": list(site.ground.remarks)}
     folder = Path("runs") / spec.name if out is None else out
     with (
         tried(folder),
@@ -159,7 +157,7 @@ def measure_muckpile(
         header=HEADER,
         rows=[row for row in rows if row[0] != _ENERGY_ROW],
         files=files,
-        remarks=[*around.remarks, *velocity_remarks(plan.prediction)],
+        remarks=[*site.ground.remarks, *velocity_remarks(plan.prediction)],
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from castblast.api.muckpile.document import bench_content
 from castblast.api.muckpile.files import OPTIONAL_FILES, write_results
@@ -15,19 +15,15 @@ from castblast.disk.files import publish, staged, tried
 from castblast.disk.locks import LOCK_NAME, only_writer
 from castblast.disk.resources import find_spec
 from castblast.errors import SimulationError, Status
-from castblast.muckpile.bench.geometry import Bench
 from castblast.muckpile.cast.solver import CastCase, CastResult, run_cast
-from castblast.muckpile.ground.walls import Walls
 from castblast.muckpile.results.metrics import pile_metrics
 from castblast.progress import ProgressCallback, silent, with_time_left
-from castblast.scene.begun import Start
 from castblast.scene.bounds import BallSizes, require_bounds
-from castblast.scene.case import bench_surroundings, cast_case, describe_sizes, require_possible
+from castblast.scene.build import Scene, Site, build, read_site
+from castblast.scene.case import describe_sizes
 from castblast.scene.options import with_numerics, with_options
-from castblast.scene.plan import Plan, make_plan
-from castblast.scene.start import make_start
 from castblast.specs.bench.bench import BenchSpec, load_bench
-from castblast.specs.bench.ground.spec import Ground, read_ground
+from castblast.specs.bench.ground.spec import Ground
 from castblast.stages.muckpile.deck import Decks, write_decks
 from castblast.stages.muckpile.extras import Extras, ReadExtras, read_extras
 from castblast.stages.muckpile.frames import Frames
@@ -110,18 +106,13 @@ def run_muckpile(
     geometry = spec.bench.to_bench()
     ore_of_bench = path.parent / spec.ore if spec.ore else None
     wanted = read_extras(extras, geometry, ore_of_bench, spec.frame)
-    ground = read_ground(spec.ground, path.parent, geometry)
-    walls = bench_surroundings(spec, geometry, ground)
-    plan = make_plan(spec, geometry, path.parent, one_speed=velocity is not None)
+    site = read_site(spec, path.parent, one_speed=velocity is not None)
     folder = Path("runs") / spec.name if out is None else out
     job = _Job(
         spec=spec,
-        bench=geometry,
+        site=site,
         beside=path.parent,
         folder=folder,
-        plan=plan,
-        walls=walls,
-        ground=ground,
         extras=extras,
         wanted=wanted,
         threads=threads or 0,
@@ -130,24 +121,21 @@ def run_muckpile(
     with tried(folder), only_writer(folder / LOCK_NAME, folder):
         with deferred_stop() as stop:
             report = _long_part(progress, 0.0, _PACKING_SHARE)
-            start, case, more = _prepare(job, packings, report, stop)
+            scene = _prepare(job, packings, report, stop)
         if decks.wanted:
-            written = write_decks(spec, case, decks)
-            remarks = velocity_remarks(plan.prediction)
-            return _with_remarks(replace(written, remarks=remarks), ground)
-        return _throw(job, start, case, more, progress)
+            written = write_decks(spec, scene.case, decks)
+            remarks = velocity_remarks(site.plan.prediction)
+            return _with_remarks(replace(written, remarks=remarks), site.ground)
+        return _throw(job, scene, progress)
 
 
 class _Job(NamedTuple):
     """What is asked for, read and checked."""
 
     spec: BenchSpec
-    bench: Bench
+    site: Site
     beside: Path
     folder: Path
-    plan: Plan
-    walls: Walls
-    ground: Ground
     extras: Extras
     wanted: ReadExtras
     threads: int
@@ -158,30 +146,30 @@ class _Job(NamedTuple):
         return self.folder / _RESTART
 
 
-def _prepare(
-    job: _Job, packings: Path, progress: ProgressCallback, stop: StopRequest
-) -> tuple[Start, CastCase, dict[str, Any]]:
-    """Balls before firing, the case, and what the document says of both."""
-    spec = job.spec
+def _prepare(job: _Job, packings: Path, progress: ProgressCallback, stop: StopRequest) -> Scene:
+    """Balls before firing and the case, within the bounds of disk and memory."""
     frames = job.extras.order(job.wanted.interval)
 
     def require(sizes: BallSizes) -> None:
-        require_bounds(spec, sizes, job.folder, job.threads, frames)
+        require_bounds(job.spec, sizes, job.folder, job.threads, frames)
 
-    start, sizes = make_start(
-        spec, job.bench, job.plan, job.beside, packings, job.threads, progress, require, stop
+    return build(
+        job.spec,
+        job.site,
+        job.beside,
+        packings,
+        threads=job.threads,
+        limit=require,
+        progress=progress,
+        stop=stop,
     )
-    case = cast_case(spec, job.walls, start.balls, job.plan, job.threads)
-    require_possible(spec, case, job.ground)
-    more = {"fragments": describe_sizes(sizes), **bench_content(spec, job.beside)}
-    return start, case, more
 
 
-def _throw(
-    job: _Job, start: Start, case: CastCase, more: dict[str, Any], progress: ProgressCallback
-) -> Outcome:
+def _throw(job: _Job, scene: Scene, progress: ProgressCallback) -> Outcome:
     """Simulate the cast and write all results at once; only then is its restart file removed."""
     spec, wanted = job.spec, job.wanted
+    start, case, plan = scene.start, scene.case, job.site.plan
+    more = {"fragments": describe_sizes(scene.sizes), **bench_content(spec, job.beside)}
     # Frames of a run that was stopped wait for it beside its restart file.
     resume = job.extras.frames and job.restart.exists()
     with staged(
@@ -193,14 +181,14 @@ def _throw(
         metrics = pile_metrics(
             start.balls,
             result.particles,
-            job.bench,
+            job.site.bench,
             block_velocity=case.block_velocity,
             walls=case.walls,
         )
         ore = follow_ore(wanted.ore, wanted.plan, case, result)
-        plan = job.plan
         outcome = describe_run(spec, plan.speed, plan.prediction, start, result, metrics, ore)
-        outcome = _with_remarks(replace(outcome, document={**outcome.document, **more}), job.ground)
+        outcome = replace(outcome, document={**outcome.document, **more})
+        outcome = _with_remarks(outcome, job.site.ground)
         files = write_results(scratch, spec, case, result, outcome.document, ore, plan.label)
         files += frames
     job.restart.unlink(missing_ok=True)
@@ -226,7 +214,7 @@ def _simulate(
         frames = Frames(
             scratch,
             case,
-            job.bench,
+            job.site.bench,
             animation=extras.animation,
             vtk=extras.vtk,
             vtkhdf=extras.vtkhdf,
