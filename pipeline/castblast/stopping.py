@@ -16,6 +16,8 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any, NoReturn, ParamSpec, TypeVar
 
+import numpy as np
+
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
@@ -128,11 +130,12 @@ def interruptible(function: Callable[_P, _R], *args: _P.args, **kwargs: _P.kwarg
         return function(*args, **kwargs)
     results: list[_R] = []
     faults: list[BaseException] = []
-    here = contextvars.copy_context()
+    here, settings = contextvars.copy_context(), np.geterr()
 
     def work() -> None:
         try:
-            results.append(here.run(function, *args, **kwargs))
+            with np.errstate(**settings):  # NumPy 1 keeps them with the thread, not the context
+                results.append(here.run(function, *args, **kwargs))
         except BaseException as fault:
             faults.append(fault)
 

@@ -149,7 +149,8 @@ def _shape_faults(polygons: tuple[OrePolygon, ...], bench: Bench | None) -> list
             )
     for k, (name, shape) in enumerate(shapes):
         for other, beside in shapes[:k]:
-            common = shape.intersection(beside).area
+            with np.errstate(invalid="ignore"):  # shapely 2.0.0 leaves a flag of GEOS behind
+                common = shape.intersection(beside).area
             if common > _OVERLAP * min(shape.area, beside.area):
                 faults.append(f"'{other}' and '{name}' overlap by {common:.3g} m2")
     return faults

@@ -62,6 +62,8 @@ def load_stl(path: Path) -> StlFile:
     binary = len(data) == _HEADER + _RECORD * stated
     text = not binary and data[:512].lstrip().lower().startswith(b"solid")
     if text:
+        if not _last_line(data).startswith(b"endsolid"):
+            raise SpecError(f"{path}: is cut off: its last line is no 'endsolid'")
         count, corners = len(_BEGIN.findall(data)), len(_VERTEX.findall(data))
         if corners != 3 * count:
             raise SpecError(
@@ -80,8 +82,6 @@ def load_stl(path: Path) -> StlFile:
         raise SpecError(
             f"{path}: is damaged: {count:,} facets {begun}, {len(corner):,} can be read"
         )
-    if text and not _last_line(data).startswith(b"endsolid"):
-        raise SpecError(f"{path}: is cut off: its last line is no 'endsolid'")
     if not len(corner):
         raise SpecError(f"{path}: holds no facet")
     bad = np.flatnonzero(~np.isfinite(corner).all(axis=(1, 2)))
