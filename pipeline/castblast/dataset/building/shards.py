@@ -139,7 +139,8 @@ def write_shard(folder: Path, span: Span, rows_sha256: str, result: BatchResult)
 
     def write(name: Path) -> None:
         marks = {_ORIGIN: np.array(rows_sha256), _SEAL: np.array(seal)}
-        np.savez(name, **arrays, **marks)
+        contents: dict[str, Any] = {**arrays, **marks}
+        np.savez(name, **contents)
 
     return write_with(path, write)
 
