@@ -4,7 +4,7 @@ VENV   ?= .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: demo test shuffle lint format bench readme clean
+.PHONY: demo test shuffle lint format bench readme docs clean
 
 PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 
@@ -31,6 +31,9 @@ format: $(VENV)/.dev
 bench: $(VENV)/.dev          ## speed figures, as ratios
 	$(BIN)/python -m pytest tests/bench --benchmark-only --benchmark-disable-gc -s
 
+docs: $(VENV)/.docs          ## the documentation site: site/index.html
+	$(BIN)/mkdocs build --quiet --config-file pipeline/site/mkdocs.yml
+
 readme:                      ## the commands of the README, after the README's own installation
 	$(PYTHON) .ci/readme.py
 
@@ -45,5 +48,9 @@ $(VENV)/.dev: pyproject.toml constraints.txt | $(VENV)/bin/python
 	$(PIP) --editable ".[dev]"
 	touch $@ $(VENV)/.demo
 
+$(VENV)/.docs: pyproject.toml constraints.txt | $(VENV)/bin/python
+	$(PIP) --editable ".[docs]"
+	touch $@
+
 clean:
-	rm -rf demo data mine simulation muckpile other_muckpile next.csv build dist .pytest_cache .mypy_cache .ruff_cache
+	rm -rf demo site data mine simulation muckpile other_muckpile next.csv build dist .pytest_cache .mypy_cache .ruff_cache

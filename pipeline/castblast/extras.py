@@ -27,6 +27,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     "parquet": ("pyarrow",),
     "onnx-test": ("onnxruntime",),
     "dvc": ("dvc",),
+    "docs": ("mkdocs", "mkdocstrings"),
     "web": ("playwright",),
 }
 #: Names of libraries as people know them, where the import name is another one.
