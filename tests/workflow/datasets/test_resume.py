@@ -6,11 +6,13 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
 from fake_blast import fake_generate, fake_simulator, write_recipe
 
+from castblast.dataset.building import build
 from castblast.dataset.building.workplace import sole_builder
 from castblast.dataset.file.store import open_dataset
 from castblast.disk.locks import LockedError
@@ -292,3 +294,25 @@ def test_workers_say_nothing_on_the_screen(tmp_path, capfd):
     out, err = capfd.readouterr()
     assert out == ""
     assert err == ""
+
+
+class SlowToClose:
+    """Stands in for a client of Dask that takes too long to close."""
+
+    def __init__(self, *_, **__):
+        pass
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        raise TimeoutError("Timeout")
+
+
+def test_a_slow_end_of_dask_does_not_hide_the_interrupt(monkeypatch):
+    monkeypatch.setattr("dask.distributed.Client", SlowToClose)
+    monkeypatch.setattr(build, "_local_cluster", lambda _: nullcontext())
+    with pytest.raises(KeyboardInterrupt), build._client(1, None):
+        raise KeyboardInterrupt
+    with pytest.raises(TimeoutError), build._client(1, None):
+        pass

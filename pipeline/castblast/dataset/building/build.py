@@ -171,8 +171,18 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[tuple[Any, C
             yield client, _ThreadCount(client)
         return
     count = workers or available_cores()
-    with _local_cluster(count) as cluster, Client(cluster, set_as_default=False) as client:
-        yield client, lambda: count
+    stopped: BaseException | None = None
+    try:
+        with _local_cluster(count) as cluster, Client(cluster, set_as_default=False) as client:
+            try:
+                yield client, lambda: count
+            except BaseException as fault:
+                stopped = fault
+                raise
+    except TimeoutError:  # on a busy machine Dask may not close in time: that is not the news
+        if stopped is None:
+            raise
+        raise stopped from None
 
 
 @contextmanager
