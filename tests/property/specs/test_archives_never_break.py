@@ -22,6 +22,7 @@ from hypothesis import strategies as st
 from castblast.dataset.building.extend import read_existing
 from castblast.dataset.file.store import open_dataset
 from castblast.disk.reading import read_npz
+from castblast.errors import DatasetError
 from castblast.muckpile.cast.restart import read_restart
 from castblast.specs.bench.balls.files import read_balls
 from castblast.specs.bench.ground.spec import GroundSpec, read_ground
@@ -188,3 +189,12 @@ def test_datasets_that_are_cut(made: Path) -> None:
             _use(path, made)
 
     check()
+
+
+@pytest.mark.parametrize("key", ["long_name", "units", "role"])
+def test_an_attribute_that_is_an_array_is_a_fault(made: Path, tmp_path: Path, key: str) -> None:
+    path = tmp_path / "d.nc"
+    shutil.copy(made, path)
+    _apply(path, [("set", "ucs", key, np.array([0, 1]))])
+    with pytest.raises(DatasetError, match="ucs"):
+        stage.describe_dataset(path)

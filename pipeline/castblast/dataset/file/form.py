@@ -21,6 +21,7 @@ from castblast.dataset.file.schema import (
     SCHEMA,
     label_attributes,
     role_of,
+    text_attribute,
 )
 from castblast.design.variables import INPUT_NAMES, OUTPUT_NAMES, VARIABLES
 from castblast.disk.reading import parse_json
@@ -92,7 +93,7 @@ def _attribute_faults(dataset: xr.Dataset) -> list[Fault]:
                 faults.append(Fault(f"attribute {name}", f"is {shortened(value)}, not a number"))
         elif not isinstance(value, str) and name != "design_seed":
             faults.append(Fault(f"attribute {name}", f"is {shortened(value)}, not a text"))
-    if attributes.get("schema", SCHEMA) != SCHEMA:
+    if "schema" in attributes and text_attribute(dataset, "schema") != SCHEMA:
         shown = shortened(attributes["schema"])
         faults.append(Fault("attribute schema", f"is '{shown}', not '{SCHEMA}'"))
     for name, (kind, of_texts) in _JSON.items():
@@ -172,11 +173,11 @@ def _form_faults(
         faults.append(Fault(name, f"type is {variable.dtype}, not {dtype}"))
     if variable.dims != dims:
         faults.append(Fault(name, f"dimensions are {variable.dims}, not {dims}"))
-    if units is not None and variable.attrs.get("units") != units:
+    if units is not None and text_attribute(variable, "units") != units:
         faults.append(
             Fault(name, f"units are '{shortened(variable.attrs.get('units', ''))}', not '{units}'")
         )
-    if not variable.attrs.get("long_name"):
+    if not text_attribute(variable, "long_name"):
         faults.append(Fault(name, "has no long_name"))
     return faults
 

@@ -164,5 +164,10 @@ def names_with_role(dataset: xr.Dataset, role: str) -> tuple[str, ...]:
 
 def role_of(variable: xr.Variable | xr.DataArray) -> str:
     """Role of a column; an attribute of another kind is none."""
-    role = variable.attrs.get("role")
-    return role if isinstance(role, str) else ""
+    return text_attribute(variable, "role")
+
+
+def text_attribute(of: xr.Variable | xr.DataArray | xr.Dataset, name: str) -> str:
+    """Text of an attribute; empty if it is missing or of another kind, an array for one."""
+    value = of.attrs.get(name)
+    return value if isinstance(value, str) else ""
