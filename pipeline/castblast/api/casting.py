@@ -21,7 +21,7 @@ from castblast.progress import part
 from castblast.scene.bounds import BallSizes, require_bounds
 from castblast.scene.build import build, read_site
 from castblast.scene.case import describe_sizes
-from castblast.scene.options import with_numerics, with_options
+from castblast.scene.options import with_options, with_precision
 from castblast.specs.bench.ground.spec import Ground
 from castblast.specs.bench.ore import read_ore
 from castblast.specs.quantity import parse_quantity
@@ -90,7 +90,7 @@ def cast(
     """
     require("simulate", purpose="castblast.cast")
     opened = bench if isinstance(bench, Bench) else load_bench(bench)
-    spec = with_numerics(with_options(opened.spec, balls, velocity), precision, None)
+    spec = with_precision(with_options(opened.spec, balls, velocity), precision)
     spec = spec if seed is None else spec.model_copy(update={"seed": int(seed)})
     network = None if model is None else model.network
     site = read_site(spec, opened.folder, one_speed=velocity is not None, network=network)

@@ -59,7 +59,6 @@ def cast_case(
         time_step=spec.numerics.time_step or 0.0,
         threads=threads,
         precision=spec.numerics.precision,
-        sleeping=spec.numerics.sleeping,
     )
 
 

@@ -45,11 +45,12 @@ def with_options(spec: BenchSpec, balls: int | None, velocity: str | float | Non
     return spec.model_copy(update=update)
 
 
-def with_numerics(spec: BenchSpec, precision: str | None, sleeping: bool | None) -> BenchSpec:
-    """Bench spec with what the command line says about the solution."""
-    if precision is not None and precision not in PRECISIONS:
+def with_precision(spec: BenchSpec, precision: str | None) -> BenchSpec:
+    """Bench spec with the precision that the command line asks for, if any."""
+    if precision is None:
+        return spec
+    if precision not in PRECISIONS:
         hint = nearest_name(precision, PRECISIONS)
         raise SpecError(f"--precision: {precision}: must be one of {', '.join(PRECISIONS)}{hint}")
-    given = {"precision": precision, "sleeping": sleeping}
-    update = {name: value for name, value in given.items() if value is not None}
-    return spec.model_copy(update={"numerics": spec.numerics.model_copy(update=update)})
+    numerics = spec.numerics.model_copy(update={"precision": precision})
+    return spec.model_copy(update={"numerics": numerics})

@@ -243,3 +243,15 @@ def test_a_state_that_is_not_finite_names_the_ball():
     result = run_cast(CastCase(balls, LAW, floor(), np.empty(0), np.empty((0, 3))))
     assert result.status == Status.UNSTABLE_STEP
     assert result.failed_ball == 17
+
+
+@pytest.mark.parametrize("precision", ["float64", "mixed"])
+def test_a_lone_ball_far_from_the_origin_stays_put(precision):
+    """On a floor at x = 80 m for 10 s; its overlap is 3e-4 of its radius."""
+    kn = np.pi * 0.1 * LAW.effective_modulus
+    sunk = ball_mass(0.1, LAW.density) * 9.81 / kn
+    start = np.array([[80.0, 80.0, 0.1 - sunk]])
+    balls = particles_at_rest(start, np.full(1, 0.1))
+    run = Simulation(balls, LAW, floor(), np.zeros(1, dtype=bool), precision=precision)
+    assert run.run(10.0, np.inf)
+    assert np.abs(run.state().position - start).max() < 1e-7

@@ -59,14 +59,6 @@ def muckpile(
             show_default=False,
         ),
     ] = None,
-    sleeping: Annotated[
-        bool | None,
-        typer.Option(
-            "--sleeping/--no-sleeping",
-            help="Skip balls at rest (overrides the bench file).",
-            show_default=False,
-        ),
-    ] = None,
     packings: Annotated[
         Path | None,
         typer.Option(
@@ -120,7 +112,6 @@ def muckpile(
         "threads": threads,
         "velocity": velocity,
         "precision": precision,
-        "sleeping": sleeping,
         "packings": packings,
         "extras": Extras(
             ore=ore,

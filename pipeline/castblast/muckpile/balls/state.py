@@ -39,11 +39,9 @@ class Balls(NamedTuple):
     place : array (n, 4), float64 [m]
         Centre and radius.
     motion : array (n, 8), real
-        Velocity [m s-1], spin [rad s-1], mass [kg], and what the ball may do: 0.0 move, 1.0 it is
-        held in place, 2.0 it sleeps (see `castblast.muckpile.engine.sleep`).
+        Velocity [m s-1], spin [rad s-1], mass [kg], and whether the ball is held in place: 1.0.
     force : array (n, 8), real
-        Force [N], moment [N m], for how long [s] the ball has been still, an unused word. Force
-        and moment are meaningless where the ball is held or sleeps.
+        Force [N], moment [N m], two unused words. Meaningless where the ball is held.
     paths : array (7, n + 16), float32
         Straight paths from the time when the lists were made, see
         `castblast.muckpile.search.paths`.
@@ -64,9 +62,6 @@ class Contacts(NamedTuple):
     Attributes
     ----------
     start : array (n + 1,), int32
-    stop : array (n,), int32
-        Contacts from here to the next ball's are of two balls that stand still: they stay as they
-        are. Without sleep there are none.
     partner : array (p,), int32
         Index of the second ball (always larger), or of the wall.
     memory : array (p, 8), real
@@ -77,7 +72,6 @@ class Contacts(NamedTuple):
     """
 
     start: Int32Array
-    stop: Int32Array
     partner: Int32Array
     memory: RealArray
     touching: NDArray[np.uint8]
@@ -85,17 +79,12 @@ class Contacts(NamedTuple):
 
 
 def make_contacts(
-    start: Int32Array,
-    partner: Int32Array,
-    real: DTypeLike,
-    ledger: bool,
-    stop: Int32Array | None = None,
+    start: Int32Array, partner: Int32Array, real: DTypeLike, ledger: bool
 ) -> Contacts:
-    """Make room for contacts that do not touch yet; without a `stop` all are computed."""
+    """Make room for contacts that do not touch yet."""
     count = len(partner)
     return Contacts(
         start,
-        start[1:] if stop is None else stop,
         partner,
         np.empty((count, ROW), dtype=real),
         np.zeros(count, dtype=np.uint8),

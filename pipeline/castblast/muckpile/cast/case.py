@@ -55,9 +55,6 @@ class CastCase(NamedTuple):
     precision : {"float64", "mixed"}
         Mixed: motion and contact memory are stored in single precision; see
         `castblast.muckpile.balls.state`.
-    sleeping : bool
-        Balls at rest are not computed until a ball near them moves; see
-        `castblast.muckpile.engine.sleep`.
     """
 
     particles: Particles
@@ -80,7 +77,6 @@ class CastCase(NamedTuple):
     sample_interval: float = 0.02
     snapshot_interval: float = 0.0
     precision: str = "float64"
-    sleeping: bool = False
 
 
 class CastHistory(NamedTuple):
@@ -115,8 +111,6 @@ class EnergyLedger(NamedTuple):
         At the end.
     slip, rolling_slip, dashpot : float
         Dissipated on the way; NaN when not recorded.
-    slept : float
-        Kinetic energy taken from balls that fell asleep.
     residual : float [-]
         Open balance over the largest of: energy put in by firing, potential energy released, and
         kinetic energy at the start.
@@ -130,7 +124,6 @@ class EnergyLedger(NamedTuple):
     slip: float
     rolling_slip: float
     dashpot: float
-    slept: float
     residual: float
 
 
@@ -140,8 +133,6 @@ class CastCounters(NamedTuple):
     Attributes
     ----------
     steps, rebuilds, particle_steps : int
-    asleep : int
-        Balls that slept at the end.
     smallest_step, largest_step : float [s]
         Of the stable step by the rule, over the run.
     largest_overlap : float [-]
@@ -156,7 +147,6 @@ class CastCounters(NamedTuple):
     steps: int
     rebuilds: int
     particle_steps: int
-    asleep: int
     smallest_step: float
     largest_step: float
     largest_overlap: float

@@ -183,7 +183,6 @@ def _make_run(case: CastCase) -> Simulation:
         ballistic=case.ballistic,
         keep_ledger=case.keep_ledger,
         precision=case.precision,
-        sleeping=case.sleeping,
     )
 
 
@@ -260,7 +259,6 @@ def _run_to_rest(
             run.steps,
             run.rebuilds,
             run.steps * len(state.radius),
-            int(run.asleep().sum()),
             run.smallest_step,
             run.largest_step,
             record.largest_overlap,
@@ -310,7 +308,7 @@ def _close_ledger(
     spent = run.dissipated if case.keep_ledger else np.full(3, nan)
     slip, rolling_slip, dashpot = map(float, spent)
     before = sum(initial)
-    gone = slip + rolling_slip + dashpot + run.put_to_sleep
+    gone = slip + rolling_slip + dashpot
     open_balance = before + fired - kinetic - potential - spring - gone
     scale = max(abs(fired), abs(initial[1] - potential), initial[0], 1e-300)
     return EnergyLedger(
@@ -322,6 +320,5 @@ def _close_ledger(
         slip,
         rolling_slip,
         dashpot,
-        run.put_to_sleep,
         open_balance / scale,
     )

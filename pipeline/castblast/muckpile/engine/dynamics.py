@@ -105,7 +105,7 @@ def _do_pairs(
 ) -> None:
     """Pair forces of the balls first .. last - 1; `work` is booked in row `w`."""
     pair_forces(
-        balls.place, balls.motion, balls.force, pairs.start, pairs.stop, pairs.partner,
+        balls.place, balls.motion, balls.force, pairs.start, pairs.partner,
         pairs.memory, pairs.touching, pairs.dash, first, last, law, step, work, w, blocks, names, b,
     )  # fmt: skip
 

@@ -250,7 +250,6 @@ def pair_forces(
     motion: RealArray,
     force: RealArray,
     start: Int32Array,
-    stop: Int32Array,
     partner: Int32Array,
     memory: RealArray,
     touching: NDArray[np.uint8],
@@ -271,7 +270,7 @@ def pair_forces(
     ----------
     place, motion, force : arrays
         Of `castblast.muckpile.balls.state.Balls`.
-    start, stop, partner, memory, touching, dash : arrays
+    start, partner, memory, touching, dash : arrays
         Of `castblast.muckpile.balls.state.Contacts`.
     first, last : int
     law : Constants
@@ -285,7 +284,7 @@ def pair_forces(
     blocks[base + _STEP] = step
     for i in range(first, last):
         x, y, z, radius = place[i, 0], place[i, 1], place[i, 2], place[i, 3]
-        for p in range(start[i], stop[i]):
+        for p in range(start[i], start[i + 1]):
             j = partner[p]
             dx, dy, dz = place[j, 0] - x, place[j, 1] - y, place[j, 2] - z
             radii = radius + place[j, 3]

@@ -20,7 +20,6 @@ from castblast.muckpile.balls.particles import Particles, ball_mass
 from castblast.muckpile.balls.state import PRECISIONS, Balls, Contacts, make_contacts
 from castblast.muckpile.engine.carry import inverse, put_aside, restore, take_rows
 from castblast.muckpile.engine.dynamics import advance, cut_chunks, present_forces
-from castblast.muckpile.engine.sleep import ASLEEP, FREE, HELD, drowsiness, note_still, settle_balls
 from castblast.muckpile.engine.stability import stable_step
 from castblast.muckpile.engine.survey import (
     BallSurvey,
@@ -52,8 +51,7 @@ FIRST_LIFE, LONGEST_LIFE = 16, 64
 #: What a run changes: numbers and arrays, and records of arrays.
 _CHANGING = (
     "clock", "steps", "rebuilds", "failed_ball", "smallest_step", "largest_step", "_slab", "_chunk",
-    "_work", "_spent", "_slept", "_pending", "_step", "_built", "_life", "_horizon", "_stale",
-    "_step_due",
+    "_work", "_spent", "_pending", "_step", "_built", "_life", "_horizon", "_stale", "_step_due",
 )  # fmt: skip
 _GROUPS: dict[str, type[Balls] | type[Contacts]] = {
     "_balls": Balls, "_pairs": Contacts, "_touches": Contacts,
@@ -85,8 +83,6 @@ class Simulation:
         Record what slip, rolling slip and dashpots dissipate.
     precision : {"float64", "mixed"}
         See `castblast.muckpile.balls.state`.
-    sleeping : bool
-        Balls at rest are not computed, see `castblast.muckpile.engine.sleep`.
     """
 
     particles: Particles
@@ -100,7 +96,6 @@ class Simulation:
     ballistic: bool = True
     keep_ledger: bool = True
     precision: str = "float64"
-    sleeping: bool = False
 
     clock: float = field(default=0.0, init=False)
     steps: int = field(default=0, init=False)
@@ -137,8 +132,7 @@ class Simulation:
         self._slab = np.array([0, count])
         self._chunk = np.array([0, 1])
         self._work = np.zeros((1, 3))
-        self._spent, self._slept = np.zeros(3), 0.0
-        self._drowsiness = drowsiness(2.0 * float(np.mean(given.radius)), self.gravity)
+        self._spent = np.zeros(3)
         self._pending, self._step = -1.0, 0.0
         self._built, self._life, self._horizon = 0.0, 0.0, inf
         self._stale, self._step_due = True, True
@@ -163,17 +157,6 @@ class Simulation:
     def dissipated(self) -> FloatArray:
         """Energy (3,) [J] spent by slip, rolling slip and dashpots so far."""
         return np.asarray(self._spent + self._work.sum(axis=0))
-
-    @property
-    def put_to_sleep(self) -> float:
-        """Kinetic energy [J] taken from balls that fell asleep so far."""
-        return self._slept
-
-    def asleep(self) -> BoolArray:
-        """Which balls (n,) sleep, in the caller's order."""
-        sleeps = np.empty(len(self._balls.place), dtype=np.bool_)
-        sleeps[self._balls.identity] = self._balls.motion[:, 7] == ASLEEP
-        return sleeps
 
     def state(self) -> Particles:
         """Return a copy of the present state in the caller's order."""
@@ -222,7 +205,7 @@ class Simulation:
         balls = self._balls
         mask = chosen[balls.identity]
         balls.motion[mask, 0:3] = velocity[balls.identity[mask]]
-        balls.motion[mask, 7] = FREE
+        balls.motion[mask, 7] = 0.0
         with enough_threads(len(mask)):
             if self._renew_lists():
                 self._evaluate()
@@ -342,15 +325,13 @@ class Simulation:
         if bad >= 0:
             self.failed_ball = bad
             return False
-        if self.sleeping:
-            note_still(self._balls, self.clock - self._built, self._drowsiness)
         fastest = greatest_deviation(self._balls.motion)
         life = self._next_life(fastest)
         reach = 2.0 * self._largest_radius + self.skin + fastest * life
         order, cell_start, grid = self._sort_balls(life, reach)
         balls, ledger = self._balls, self.keep_ledger
         real, place_of = balls.motion.dtype, inverse(order)
-        held = balls.motion[:, 7] == HELD
+        held = balls.motion[:, 7] != 0.0
         held = held if held.any() else held[:0]
         near = (balls.paths, held)
         guess = 1.1 * len(self._pairs.partner) / len(order) + 4.0
@@ -362,21 +343,14 @@ class Simulation:
         # The old list goes before the new one comes.
         self._pairs = self._touches
         start, partner = list_pairs(*near, cell_start, self._slab, grid, life, guess)
-        stop = None
-        if self.sleeping:
-            patience = self._drowsiness.patience
-            taken, stop = settle_balls(balls, start, partner, self._slab, patience)
-            self._slept += taken
-        self._pairs = make_contacts(start, partner, real, ledger, stop)
+        self._pairs = make_contacts(start, partner, real, ledger)
         restore(self._pairs, memory, order, place_of, False)
 
         self._chunk = cut_chunks(self._pairs.start[self._slab] + 2 * self._slab)
         self._spent += self._work.sum(axis=0)
         self._work = np.zeros((len(self._slab) - 1, 3))
         self._built, self._life, self._stale = self.clock, life, False
-        # Balls that may fall asleep are looked at, whether their list needs a renewal or not.
-        look = 0.25 * self._drowsiness.patience if self.sleeping else inf
-        self._horizon = life if life > 0.0 else look
+        self._horizon = life if life > 0.0 else inf
         self.rebuilds += 1
         return True
 

@@ -188,15 +188,11 @@ class Numerics(Spec):
         Share of the stable step that is used.
     precision : {"mixed", "float64"}
         Mixed: motion and memory of contacts in single precision, places in double.
-    sleeping : bool
-        Balls at rest are not computed until one near them moves; pays in runs that go on long
-        after most balls have come to rest.
     """
 
     time_step: Annotated[float, QuantityIn("s", above=0.0, upper=1.0)] | None = None
     step_safety: Annotated[float, QuantityIn("1", 0.05, 0.95)] = 0.8
     precision: Literal["mixed", "float64"] = "mixed"
-    sleeping: bool = False
 
 
 class StopRule(Spec):

@@ -21,7 +21,7 @@ from castblast.progress import ProgressCallback, silent, with_time_left
 from castblast.scene.bounds import BallSizes, require_bounds
 from castblast.scene.build import Scene, Site, build, read_site
 from castblast.scene.case import describe_sizes
-from castblast.scene.options import with_numerics, with_options
+from castblast.scene.options import with_options, with_precision
 from castblast.specs.bench.bench import BenchSpec, load_bench
 from castblast.specs.bench.ground.spec import Ground
 from castblast.stages.muckpile.deck import Decks, write_decks
@@ -44,7 +44,6 @@ def run_muckpile(
     velocity: str | float | None = None,
     seed: int | None = None,
     precision: str | None = None,
-    sleeping: bool | None = None,
     packings: str | Path | None = None,
     extras: Extras = Extras(),  # noqa: B008 - a record of constants
     decks: Decks = Decks(),  # noqa: B008 - a record of constants
@@ -69,8 +68,7 @@ def run_muckpile(
     seed : int, optional
         Instead of that of the file.
     precision : {"mixed", "float64"}, optional
-    sleeping : bool, optional
-        Instead of `numerics` of the file.
+        Instead of `numerics.precision` of the file.
     packings : path, optional
         Folder of packings, named by the hash of their content: one that is there is used again,
         whatever run made it. Default: ``packings`` in `out`.
@@ -99,8 +97,7 @@ def run_muckpile(
     out = None if out is None else Path(out)
     packings = None if packings is None else Path(packings)
     path = find_spec(bench, "bench")
-    spec = with_options(load_bench(path), balls, velocity)
-    spec = with_numerics(spec, precision, sleeping)
+    spec = with_precision(with_options(load_bench(path), balls, velocity), precision)
     if seed is not None:
         spec = spec.model_copy(update={"seed": seed})
     geometry = spec.bench.to_bench()

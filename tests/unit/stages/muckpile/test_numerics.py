@@ -1,4 +1,4 @@
-"""Precision and sleep of a run: bench file, command line over it, and what a run says it used."""
+"""Precision of a run: bench file, command line over it, and what a run says it used."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ BENCH: dict[str, Any] = {
     "velocity": "6 m/s",
     "balls": {"count": 100},
     "stop": {"longest_time": "0.05 s"},
-    "numerics": {"sleeping": True},
+    "numerics": {"step_safety": 0.7},
 }
 
 
@@ -29,11 +29,12 @@ def written(folder: Path, **change: Any) -> Path:
 
 
 def test_defaults_and_file(tmp_path: Path) -> None:
-    """Mixed precision unless the file asks for double; nobody sleeps unless it says so."""
-    plain = load_bench(written(tmp_path, numerics={})).numerics
-    assert (plain.precision, plain.sleeping) == ("mixed", False)
-    asked = load_bench(written(tmp_path, numerics={"precision": "float64", "sleeping": True}))
-    assert (asked.numerics.precision, asked.numerics.sleeping) == ("float64", True)
+    """Mixed precision unless the file asks for double; a key of older files is a fault."""
+    assert load_bench(written(tmp_path, numerics={})).numerics.precision == "mixed"
+    asked = load_bench(written(tmp_path, numerics={"precision": "float64"}))
+    assert asked.numerics.precision == "float64"
+    with pytest.raises(SpecError, match=r"^[^\n]*numerics\.sleeping: unknown key[^\n]*$"):
+        load_bench(written(tmp_path, numerics={"sleeping": True}))
     with pytest.raises(SpecError, match=r"numerics\.precision"):
         load_bench(written(tmp_path, numerics={"precision": "float32"}))
 
@@ -52,16 +53,14 @@ def test_a_run_says_what_it_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(
         "castblast.stages.muckpile.run.run_cast",
         lambda case, *rest, **options: (
-            seen.append((case.precision, case.sleeping)),
+            seen.append((case.precision, case.step_safety)),
             run(case, *rest, **options),
         )[1],
     )
     path = written(tmp_path)
     document = run_muckpile(path, tmp_path / "out", threads=1, precision="float64").document
     assert document["numerics"]["precision"] == "float64"
-    assert document["numerics"]["sleeping"] is True
-    assert document["ledger"]["slept"] == 0.0
-    document = run_muckpile(path, tmp_path / "out", threads=1, sleeping=False).document
+    assert document["numerics"]["step_safety"] == 0.7
+    document = run_muckpile(path, tmp_path / "out", threads=1).document
     assert document["numerics"]["precision"] == "mixed"
-    assert document["numerics"]["sleeping"] is False
-    assert seen == [("float64", True), ("mixed", False)]
+    assert seen == [("float64", 0.7), ("mixed", 0.7)]
