@@ -6,6 +6,7 @@ command line and Python face are written from the code, so that they cannot fall
 
 from __future__ import annotations
 
+import json
 import os
 import posixpath
 import re
@@ -29,6 +30,7 @@ ELSEWHERE = {
     "data_specs/README.md": "data_specs.md",
     "data_specs/FORMAT.md": "FORMAT.md",
     "models/README.md": "models.md",
+    "pipeline/notebooks/engineer.ipynb": "notebooks/engineer.md",
 }
 _LINK = re.compile(r"(!?)\[([^\]]*)\]\((?!https?:|mailto:|#)([^)\s#]+)(#[^)\s]*)?\)")
 #: Not for the reader of a reference.
@@ -39,6 +41,9 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the pages from elsewhere, the pictures they show, and the pages written from the code."""
     for source, page in ELSEWHERE.items():
         text = (ROOT / source).read_text(encoding="utf-8")
+        if source.endswith(".ipynb"):
+            files.append(File.generated(config, f"notebooks/{Path(source).name}", content=text))
+            text = notebook_page(text, Path(source).name)
         files.append(File.generated(config, page, content=text))
     for picture in sorted((ROOT / "models/figures").glob("*.png")):
         uri = f"models/figures/{picture.name}"
@@ -50,6 +55,17 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     }.items():
         files.append(File.generated(config, page, content=text))
     return files
+
+
+def notebook_page(text: str, name: str) -> str:
+    """Text and code of a notebook as a page, with the file itself to take along."""
+    parts = []
+    for cell in json.loads(text)["cells"]:
+        source = "".join(cell["source"])
+        parts.append(source if cell["cell_type"] == "markdown" else f"```python\n{source}\n```")
+    title, *rest = "\n\n".join(parts).split("\n", 1)
+    link = f'<a href="{name}" download>{name}</a>'
+    return f"{title}\n\nThe notebook itself, to run and to change: {link}.\n{rest[0]}\n"
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:

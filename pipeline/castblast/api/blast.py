@@ -208,7 +208,7 @@ class Blast:
             f"{self.explosive}, {self.mode} mode, {self.parameters} parameters",
             table(("output", "value", BAND_TITLE, "unit"), found),
             table(("input", "value"), given),
-            bar(shares, f"where {work * 1e-6:.3g} MJ/m of gas work go"),
+            bar(shares, f"where {work * 1e-6:.3g} MJ/m of gas work goes"),
             lead=BAND_WORDS,
         )
 

@@ -140,6 +140,6 @@ def _draw_ledger(axis: Any, document: Mapping[str, Any]) -> None:
     axis.set_xlim(right=max(s[1] for s in shares) * 1.2)
     axis.grid(visible=False, axis="y")
     axis.set(
-        title=f"Where {total * 1e-6:.1f} MJ/m of gas work go",
+        title=f"Where {total * 1e-6:.1f} MJ/m of gas work goes",
         xlabel="share of the gas work [%]",
     )

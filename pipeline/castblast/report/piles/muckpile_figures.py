@@ -198,6 +198,8 @@ def plan_figure(before: Particles, after: Particles, bench: Bench) -> Figure:
         canvas.show(panel, shown)
         draw_faces(panel, bench, along_first=not beside)
     thrown, along = "x [m], direction of throw", "y [m], along the bench"
+    if beside and across < 0.5:  # in one line it would be longer than the axis
+        along = along.replace(", ", ",\n")
     for panel in axes:
         panel.set(xlabel=thrown if beside else along, ylabel=along if beside else thrown)
         panel.label_outer()
