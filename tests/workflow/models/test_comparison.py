@@ -259,7 +259,7 @@ def test_runs_are_sorted_by_a_metric(whole: Path) -> None:
         (("runs", "--stage", "fits"), ("fits", "did you mean 'fit'")),
         (("runs", "--sort", "valid_eror"), ("did you mean 'valid_error'",)),
         (("broken",), ("mlflow.db", "cannot be read")),
-        (("other",), ("mlflow.db", "not as MLflow 3")),
+        (("other",), ("mlflow.db", "not a store of MLflow")),
     ],
 )
 def test_lists_that_cannot_be_made(

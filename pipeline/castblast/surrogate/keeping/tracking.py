@@ -1,4 +1,4 @@
-"""A lab book of fits, comparisons and studies in MLflow: the only module that imports it.
+"""A lab book of fits, comparisons and studies in MLflow.
 
 An observer: it receives finished work and returns nothing that anyone reads, so results are the
 same with tracking off. Runs live in a SQLite file with the artifacts beside it (plain file stores
@@ -8,7 +8,6 @@ are no longer opened by MLflow). MLflow keeps absolute paths: move the exports, 
 from __future__ import annotations
 
 import math
-import os
 import subprocess
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -18,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from castblast.disk.plain import finite
 from castblast.surrogate.fitting.features import SPLITS
 from castblast.surrogate.fitting.training import Fit, LearningPoint
+from castblast.surrogate.keeping.lab_book import open_store
 from castblast.surrogate.keeping.logged_model import log_model
 from castblast.version import __version__
 
@@ -103,7 +103,7 @@ class MlflowTracker:
     def _parent(self, source: Mapping[str, str], stage: str) -> Iterator[Any]:
         """Open the store and a parent run in the experiment of a dataset."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        with _quiet_mlflow(f"sqlite:///{self.folder / 'mlflow.db'}") as mlflow:
+        with open_store(self.folder / "mlflow.db") as mlflow:
             major = source.get("dataset_version", "0").split(".")[0]
             experiment = f"{source.get('name', 'dataset')}/{major}"
             if mlflow.get_experiment_by_name(experiment) is None:
@@ -112,29 +112,6 @@ class MlflowTracker:
             mlflow.set_experiment(experiment)
             with mlflow.start_run(run_name=stage, tags=_tags(source, stage)):
                 yield mlflow
-
-
-@contextmanager
-def _quiet_mlflow(uri: str) -> Iterator[Any]:
-    """MLflow on our store, without telemetry or chatter; the earlier store is put back."""
-    os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
-    os.environ.setdefault("MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR", "false")
-    import logging
-
-    import mlflow
-
-    loggers = [logging.getLogger(name) for name in ("mlflow", "alembic")]
-    levels = [logger.level for logger in loggers]
-    earlier = mlflow.get_tracking_uri()
-    try:
-        for logger in loggers:
-            logger.setLevel(logging.ERROR)
-        mlflow.set_tracking_uri(uri)
-        yield mlflow
-    finally:
-        mlflow.set_tracking_uri(earlier)
-        for logger, level in zip(loggers, levels, strict=True):
-            logger.setLevel(level)
 
 
 def _tags(source: Mapping[str, str], stage: str) -> dict[str, str]:
@@ -206,10 +183,10 @@ def _dataset(mlflow: Any, fit: Fit) -> Any:
 
 def _log_curve(mlflow: Any, run_id: str, curve: Sequence[LearningPoint]) -> None:
     """Learning curve as metrics whose step is the number of training rows, in one call."""
-    from mlflow.entities import Metric
-
     metrics = [
-        Metric(f"curve_{part}_p95_rel_err_{target}", entry.relative_error_95, 0, point.rows)
+        mlflow.entities.Metric(
+            f"curve_{part}_p95_rel_err_{target}", entry.relative_error_95, 0, point.rows
+        )
         for point in curve
         for part, scores in (("train", point.train), ("test", point.test))
         for target, entry in scores.items()
