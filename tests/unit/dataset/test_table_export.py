@@ -55,6 +55,35 @@ def test_both_files_hold_the_numbers_of_the_dataset(stored: Path, tables: Path) 
                     assert np.array_equal(found, values, equal_nan=True), name
 
 
+def test_columns_of_a_user_come_last(stored: Path, tmp_path: Path) -> None:
+    """Numbers, truth values and texts, described by the record; a text is never a formula."""
+    texts = np.array(["=1+1", *["quarry"] * (ROWS - 1)])
+    with cb.open_dataset(stored) as dataset:
+        before = column_names(dataset)
+        mine = dataset.assign(
+            mean_burden=dataset["burden"] / 2,
+            is_hard=dataset["ucs"] > 1e8,
+            site=("sample", texts),
+            per_kind=("explosive_type", np.arange(4.0)),
+        )
+        mine["mean_burden"].attrs = {"units": "m", "long_name": "half of the burden"}
+        mine.castblast.export(tmp_path, ["csv", "parquet"])
+        half, hard = (mine[name].to_numpy() for name in ("mean_burden", "is_hard"))
+    for table in (
+        pd.read_csv(tmp_path / "samples.csv"),
+        pd.read_parquet(tmp_path / "samples.parquet"),
+    ):
+        assert list(table.columns) == [*before, "mean_burden", "is_hard", "site"]
+        assert np.array_equal(table["mean_burden"], half)
+        assert np.array_equal(table["is_hard"], hard)
+        assert table["site"].tolist() == ["'=1+1", *texts[1:]]
+    record: Any = read_json(tmp_path / "croissant.json")
+    fields = {each["name"]: each for each in record["recordSet"][0]["field"]}
+    assert fields["mean_burden"]["description"] == "half of the burden [m]"
+    kinds = [fields[name]["dataType"] for name in ("mean_burden", "is_hard", "site")]
+    assert kinds == ["sc:Float", "sc:Boolean", "sc:Text"]
+
+
 def test_blocks_change_no_byte(
     stored: Path, tables: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -144,6 +144,8 @@ def _field(variable: xr.DataArray, column: str, name: str, table: TableFile) -> 
 
 
 def _kind(variable: xr.DataArray, column: str) -> str:
-    if column in _FLAGS:
+    if column in _FLAGS or variable.dtype.kind in "OU":
         return "sc:Text"
+    if variable.dtype.kind == "b":
+        return "sc:Boolean"
     return "sc:Integer" if np.issubdtype(variable.dtype, np.integer) else "sc:Float"

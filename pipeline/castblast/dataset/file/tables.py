@@ -1,8 +1,9 @@
 """The rows of a dataset as tables for other tools: CSV and Parquet, written block by block.
 
 One row a sample: names of explosive, split and status, then every variable in SI, by its name, with
-those that are the same in all rows. Histories stay in the netCDF file. Both files hold the same
-numbers to the last bit; `castblast.dataset.file.croissant` describes them.
+those that are the same in all rows, then columns that a user has added. Histories stay in the
+netCDF file. Both files hold the same numbers to the last bit; `castblast.dataset.file.croissant`
+describes them.
 """
 
 from __future__ import annotations
@@ -54,9 +55,14 @@ def table_formats(formats: Sequence[str]) -> list[str]:
 
 
 def column_names(dataset: xr.Dataset) -> list[str]:
-    """Columns of a table, in order."""
+    """Columns of a table, in order; those that a user has added come last."""
     known = [*LABELS, *INPUT_NAMES, *OUTPUT_NAMES]
-    return [name for name in known if name in dataset.variables]
+    own = [
+        str(name)
+        for name, variable in dataset.variables.items()
+        if variable.dims == ("sample",) and name not in known
+    ]
+    return [*(name for name in known if name in dataset.variables), *own]
 
 
 def write_tables(dataset: xr.Dataset, folder: Path, formats: Sequence[str]) -> list[Path]:
@@ -114,7 +120,11 @@ def _column(block: xr.Dataset, name: str, rows: int) -> Any:
         return np.array(
             [cell_text(text) for text in flag_names(block[name]).tolist()], dtype=object
         )
-    return np.broadcast_to(block[name].to_numpy(), rows)
+    values = np.broadcast_to(block[name].to_numpy(), rows)
+    if values.dtype.kind not in "OU":
+        return values
+    cells = [cell_text(cell) if isinstance(cell, str) else cell for cell in values.tolist()]
+    return np.array(cells, dtype=object)
 
 
 def _write_csv(frames: Iterator[pd.DataFrame], path: Path) -> None:
