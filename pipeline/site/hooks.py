@@ -31,6 +31,7 @@ ELSEWHERE = {
     "data_specs/FORMAT.md": "FORMAT.md",
     "models/README.md": "models.md",
     "pipeline/notebooks/engineer.ipynb": "notebooks/engineer.md",
+    "pipeline/notebooks/data_maker.ipynb": "notebooks/data_maker.md",
 }
 _LINK = re.compile(r"(!?)\[([^\]]*)\]\((?!https?:|mailto:|#)([^)\s#]+)(#[^)\s]*)?\)")
 #: Not for the reader of a reference.
