@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
+from castblast.dataset.building.produce import build_dataset
 from castblast.dataset.file.provenance import load_explosives
 from castblast.dataset.file.schema import HISTORIES, plausible_range
 from castblast.dataset.rows.design import make_design
@@ -19,7 +20,7 @@ from castblast.dataset.rows.simulation import BatchResult, BlastSimulator, blast
 from castblast.design.variables import OUTPUT_NAMES
 from castblast.errors import Status
 from castblast.specs.recipe import load_recipe
-from castblast.stages.datasets.generate import GenerateOutcome, produce
+from castblast.stages.datasets.generate import GenerateOutcome, generated
 
 RECIPE = {
     "name": "small",
@@ -93,7 +94,7 @@ def fake_generate(recipe: Path, path: Path, *, simulator=None, **options) -> Gen
     """Build the dataset of a recipe file without physics."""
     source = load_recipe(recipe)
     simulator = simulator or fake_simulator(recipe)
-    return produce(source, load_explosives(source), simulator, path, **options)
+    return generated(build_dataset(source, load_explosives(source), simulator, path, **options))
 
 
 if __name__ == "__main__":

@@ -50,12 +50,6 @@ def explosive_mass(geometry: BurdenGeometry, explosive_density: float) -> float:
 
 
 @kernel
-def powder_factor(geometry: BurdenGeometry, explosive_density: float) -> float:
-    """Explosive mass per volume of broken rock [kg m-3]."""
-    return explosive_mass(geometry, explosive_density) / rock_volume(geometry)
-
-
-@kernel
 def breakout_width(geometry: BurdenGeometry) -> float:
     """Full width of the break-out plane [m]: the spacing, at most twice the mean burden.
 

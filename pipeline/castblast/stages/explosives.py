@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from castblast.explosive.cj import volume_at_pressure, work_to_pressure
-from castblast.explosive.finding import Finding, rejected, warned
+from castblast.explosive.finding import rejected, warned
 from castblast.explosive.isentrope import energy, in_hole_velocity, pressure, slope
 from castblast.specs.explosive import load_explosive
 from castblast.stages.outcome import Outcome
@@ -62,7 +62,7 @@ def describe(name_or_path: str) -> dict[str, Any]:
     }
 
 
-def check(name_or_path: str) -> list[Finding]:
+def check_explosive(name_or_path: str) -> Outcome:
     """Hold the numbers of an explosive against each other; does not raise on a failed relation.
 
     Raises
@@ -70,11 +70,6 @@ def check(name_or_path: str) -> list[Finding]:
     SpecError
         Unknown name, or faults of the file.
     """
-    return load_explosive(name_or_path).check()
-
-
-def check_explosive(name_or_path: str) -> Outcome:
-    """As `check`, in the form that the command line shows."""
     spec = load_explosive(name_or_path)
     findings = spec.check()
     failed = [f"{spec.name}: {finding}" for finding in rejected(findings)]

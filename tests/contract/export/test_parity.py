@@ -13,7 +13,7 @@ import pytest
 
 from castblast.bands import BASIS, PRIORS
 from castblast.errors import CheckError, SpecError
-from castblast.export.onnx.file import OPSET, run_onnx, to_onnx
+from castblast.export.onnx.file import OPSET, run_onnx_rows, to_onnx
 from castblast.export.parity import TOLERANCE, check_parity
 from castblast.export.targets import TARGETS
 from castblast.network import Network, evaluate_rows, explosive_index
@@ -130,7 +130,9 @@ def test_onnx_is_float64_old_enough_and_takes_any_batch(network: Network) -> Non
     for rows in (1, 3):
         numeric, index = network.golden.inputs[:rows], np.zeros(rows, dtype=np.int64)
         np.testing.assert_allclose(
-            run_onnx(content, numeric, index), evaluate_rows(network, numeric, index), rtol=1e-12
+            run_onnx_rows(content, numeric, index).values,
+            evaluate_rows(network, numeric, index),
+            rtol=1e-12,
         )
     metadata = {entry.key: json.loads(entry.value) for entry in model.metadata_props}
     assert metadata["inputs"] == list(network.input_names)
@@ -168,6 +170,6 @@ def test_reference_evaluator_agrees_with_onnxruntime(monkeypatch: pytest.MonkeyP
     network = load_network()
     model, golden = to_onnx(network), network.golden
     index = np.array([explosive_index(network, name) for name in golden.explosives])
-    fast = run_onnx(model, golden.inputs, index)
+    fast = run_onnx_rows(model, golden.inputs, index).values
     monkeypatch.setitem(sys.modules, "onnxruntime", None)
-    np.testing.assert_allclose(run_onnx(model, golden.inputs, index), fast, rtol=1e-12)
+    np.testing.assert_allclose(run_onnx_rows(model, golden.inputs, index).values, fast, rtol=1e-12)

@@ -15,7 +15,7 @@ import pytest
 from castblast.api.training.fits import FIT_FILE
 from castblast.disk.files import write_json
 from castblast.errors import CheckError, SpecError
-from castblast.export.onnx.file import run_onnx, run_onnx_rows, wrap_onnx
+from castblast.export.onnx.file import run_onnx_rows, wrap_onnx
 from castblast.export.parity import TOLERANCE, check_wrapped_parity
 from castblast.network import in_domain, offending_inputs, predict_rows
 from castblast.specs.models.model import PAPER_FEATURES, PAPER_TARGETS, read_model_spec
@@ -159,7 +159,7 @@ def test_a_module_of_any_shape_is_the_estimator(
         numeric = part[list(shell.input_names)].to_numpy()
         index = np.array([shell.explosives.index(name) for name in part["explosive"]])
         truth = estimators.predict(fit.estimator, part)
-        np.testing.assert_allclose(run_onnx(content, numeric, index), truth, rtol=1e-12)
+        np.testing.assert_allclose(run_onnx_rows(content, numeric, index).values, truth, rtol=1e-12)
 
 
 def test_the_file_is_like_that_of_a_network(make: Make, tmp_path: Path) -> None:

@@ -7,13 +7,27 @@ import pytest
 
 from castblast.kernel import kernel
 from castblast.nearfield.rock.mohr_coulomb import (
+    ReturnedStress,
     apex_tension,
+    edge_return,
     friction_number,
     make_yield_model,
-    return_to_yield,
 )
+from castblast.nearfield.rock.single_plane import single_plane_return
 
 BULK, SHEAR, UCS = 13.3e9, 8e9, 1e8
+
+
+@kernel
+def return_to_yield(model, radial, hoop, axial, ucs, tension):
+    """Return a trial stress to the strength surface, as a zone does."""
+    one = single_plane_return(model.planes, radial, hoop, axial, ucs, tension)
+    if one.solved:
+        return ReturnedStress(
+            one.radial, one.hoop, one.axial, one.shear_radial, one.shear_hoop, one.shear_axial,
+            one.opening_radial, one.opening_hoop, one.opening_axial, one.shear, one.opening, False,
+        )  # fmt: skip
+    return edge_return(model, radial, hoop, axial, ucs, tension)
 
 
 def model(friction_deg=40.0, dilation_deg=0.0):

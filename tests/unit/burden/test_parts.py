@@ -20,7 +20,6 @@ from castblast.burden.geometry import (
     burden_mass,
     explosive_mass,
     mean_burden,
-    powder_factor,
     pressurised_plane,
 )
 from castblast.burden.motion import HISTORY_POINTS, no_burden_motion, solve_burden_motion
@@ -60,8 +59,6 @@ def test_inclined_face_adds_rock_at_the_toe() -> None:
 def test_charge_fills_its_own_diameter() -> None:
     mass = 800 * pi / 4 * 0.08**2 * 8
     assert explosive_mass(BENCH, 800.0) == pytest.approx(mass, rel=1e-14)
-    volume = burden_mass(BENCH) / 2500
-    assert powder_factor(BENCH, 800.0) == pytest.approx(mass / volume, rel=1e-14)
 
 
 def test_breakout_plane_is_the_spacing_or_twice_the_burden() -> None:

@@ -15,7 +15,7 @@ from castblast.stages.training.train import train
 
 #: Functions of one stage for another, which hand on what is a path already.
 _INNER = {"outcome", "read_extras", "build_page", "compare_with_physics", "write_demo_report",
-          "summarise", "read_runs", "produce"}  # fmt: skip
+          "summarise", "read_runs"}  # fmt: skip
 
 
 def test_no_verb_asks_for_a_path_object(repository: Path) -> None:

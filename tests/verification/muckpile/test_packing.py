@@ -20,12 +20,13 @@ from castblast.muckpile.bench.geometry import Bench, assign_blocks
 from castblast.muckpile.bench.given import pressed_share
 from castblast.muckpile.bench.packing import (
     check_packing,
-    estimate_count,
+    count_of,
     fill_bench,
     mean_radius_for_count,
 )
 from castblast.muckpile.bench.porosity import solid_fraction
 from castblast.muckpile.bench.separation import push_apart
+from castblast.muckpile.bench.sizes import uniform_sizes
 from castblast.muckpile.bench.surroundings import bench_walls
 from castblast.muckpile.cast.solver import CastCase, run_cast
 from castblast.muckpile.ground.walls import Walls, floor, join, plane
@@ -46,7 +47,8 @@ def test_packing_has_the_fraction_asked_for(packing):
     force chains on small balls pass a tenth of the radius at the foot of the bench.
     """
     assert packing.status == Status.OK
-    assert len(packing.particles.radius) == estimate_count(BENCH, MEAN_RADIUS) == 2000
+    assert len(packing.particles.radius) == 2000
+    assert count_of(BENCH, uniform_sizes(MEAN_RADIUS, 0.5)) == 2000
     assert packing.solid_fraction == pytest.approx(0.60, abs=0.01)
     assert packing.mean_overlap < 0.03
     allowed = pressed_share(packing.particles, ContactLaw())

@@ -2,16 +2,16 @@
 
 import numpy as np
 import pytest
-from near_field_problems import annulus, rock, wave_speed
-
-from castblast.nearfield.case import Rock
-from castblast.nearfield.closed_form import (
+from closed_forms import (
     CavityRock,
     cavity_expansion,
     cavity_plastic_ratio,
     lame_displacement,
     salencon,
 )
+from near_field_problems import annulus, rock, wave_speed
+
+from castblast.nearfield.case import Rock
 from castblast.nearfield.march import march
 from castblast.nearfield.rock.lagrangian import VISCOUS, graded_radii
 

@@ -4,13 +4,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from closed_forms import CavityRock, cavity_expansion
 from near_field_problems import ANFO, DOPED, EMULSION, HEAVY_ANFO, base_hole, blast, rock
 
 from castblast.errors import Status
 from castblast.explosive.isentrope import energy, pressure, tabulated_isentrope
 from castblast.nearfield import solver
 from castblast.nearfield.case import EndMode, Hole, NearFieldSettings, TensionMode
-from castblast.nearfield.closed_form import CavityRock, cavity_expansion
 from castblast.nearfield.front import front_number, regularised_share
 from castblast.nearfield.march import WallLoad, full_pressure, march
 from castblast.nearfield.rock.lagrangian import elastic_energy, kinetic_energy

@@ -29,8 +29,6 @@ from castblast.errors import DatasetError, SpecError, nearest_name
 from castblast.names import shortened
 
 _COUNTS = ("designs_drawn", "n_ok", "n_failed")
-#: Attributes of a sampled column that are numbers.
-_SAMPLED = ("sampled_lower", "sampled_upper")
 #: JSON attributes: whether they hold a group (or a list), and whether of texts only.
 _JSON = {
     "dependency_versions": (dict, False),

@@ -122,19 +122,6 @@ def row_blocks(dataset: xr.Dataset, rows: int = BLOCK_ROWS) -> Iterator[xr.Datas
         yield loaded
 
 
-def read_file(path: Path) -> xr.Dataset:
-    """Read a netCDF file of any kind into memory and close it.
-
-    Raises
-    ------
-    DatasetError
-        One line: missing, a folder, empty, not netCDF, truncated.
-    """
-    with reading(path) as dataset:
-        loaded: xr.Dataset = dataset.load()
-    return loaded
-
-
 @contextmanager
 def reading(path: Path) -> Iterator[xr.Dataset]:
     """Open a netCDF file of any kind without reading its values; they are read when asked for.
@@ -144,7 +131,8 @@ def reading(path: Path) -> Iterator[xr.Dataset]:
     Raises
     ------
     DatasetError
-        As `read_file`, also for values that cannot be read later on.
+        One line: missing, a folder, empty, not netCDF, truncated; also for values that cannot be
+        read later on.
     """
     import netCDF4
 
@@ -176,7 +164,7 @@ def reading_dataset(path: Path) -> Iterator[xr.Dataset]:
     Raises
     ------
     DatasetError
-        As `read_file`, or the file is of another kind or a newer format.
+        As `reading`, or the file is of another kind or a newer format.
     """
     with reading(path) as dataset:
         _require_format(dataset, path)
@@ -189,7 +177,7 @@ def open_dataset(path: Path) -> xr.Dataset:
     Raises
     ------
     DatasetError
-        As `read_file`, or the file is of another kind or a newer format.
+        As `reading`, or the file is of another kind or a newer format.
     """
     with reading_dataset(path) as dataset:
         loaded: xr.Dataset = dataset.load()

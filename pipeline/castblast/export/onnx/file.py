@@ -294,11 +294,6 @@ def _metadata(shell: Shell) -> dict[str, str]:
     return {key: json.dumps(value) for key, value in entries.items()}
 
 
-def run_onnx(model: bytes, numeric: FloatArray, index: IntArray) -> FloatArray:
-    """Values (n, m) of an ONNX file for SI rows (n, k), in the order of its outputs."""
-    return run_onnx_rows(model, numeric, index).values
-
-
 def run_onnx_rows(model: bytes, numeric: FloatArray, index: IntArray) -> Answers:
     """Evaluate an ONNX file: with onnxruntime on one thread, or with the reference of ONNX.
 

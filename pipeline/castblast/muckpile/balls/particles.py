@@ -74,23 +74,6 @@ def ball_inertia(radius: FloatArray, density: float) -> FloatArray:
     return 0.4 * ball_mass(radius, density) * radius**2
 
 
-def translational_energy(particles: Particles, density: float) -> float:
-    """Kinetic energy [J] of the motion of the centres."""
-    mass = ball_mass(particles.radius, density)
-    return float(0.5 * np.sum(mass * np.sum(particles.velocity**2, axis=1)))
-
-
-def rotational_energy(particles: Particles, density: float) -> float:
-    """Kinetic energy [J] of the spins."""
-    inertia = ball_inertia(particles.radius, density)
-    return float(0.5 * np.sum(inertia * np.sum(particles.angular_velocity**2, axis=1)))
-
-
-def potential_energy(particles: Particles, density: float, gravity: float = 9.81) -> float:
-    """Potential energy [J] over the level z = 0."""
-    return float(np.sum(ball_mass(particles.radius, density) * particles.position[:, 2]) * gravity)
-
-
 def centre_of_mass(particles: Particles) -> FloatArray:
     """Centre of mass (3,) [m]; the balls have one density."""
     weight = particles.radius**3

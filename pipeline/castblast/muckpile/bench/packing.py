@@ -99,16 +99,6 @@ class Packing(NamedTuple):
     status: Status
 
 
-def estimate_count(
-    bench: Bench,
-    mean_radius: float,
-    relative_deviation: float = 0.5,
-    solid_fraction: float = 0.60,
-) -> int:
-    """Number of balls that fill `bench`; radii even in mean_radius (1 -+ relative_deviation)."""
-    return count_of(bench, uniform_sizes(mean_radius, relative_deviation), solid_fraction)
-
-
 def count_of(bench: Bench, sizes: Sizes, solid_fraction: float = 0.60) -> int:
     """Number of balls of these `sizes` that fill `bench`."""
     return round(solid_volume(bench, sizes, solid_fraction) / mean_ball_volume(sizes))

@@ -105,15 +105,6 @@ def random_close_fraction(sizes: Sizes) -> float:
     return float(0.634 + 0.0658 * deviation + 0.0857 * skewed)
 
 
-def volume_below(sizes: Sizes, diameter: FloatArray) -> FloatArray:
-    """Share of the volume in balls below `diameter` (n,) [m]: the sieve curve."""
-    share = np.diff(sizes.below) * _mean_power(sizes.radius, 3)
-    low, high = sizes.radius[:-1], sizes.radius[1:]
-    part = np.clip(0.5 * np.asarray(diameter, dtype=np.float64)[:, None], low, high)
-    width = np.where(high > low, high**4 - low**4, 1.0)
-    return np.asarray(((part**4 - low**4) / width) @ share / share.sum())
-
-
 def draw_radii(sizes: Sizes, count: int, rng: np.random.Generator) -> FloatArray:
     """Draw `count` radii [m], one from each of `count` equal shares, in random order.
 

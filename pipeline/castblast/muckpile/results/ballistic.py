@@ -52,19 +52,6 @@ def block_throw(speed: float, height: float, gravity: float = 9.81) -> float:
     return 2.0 / 3.0 * level_reach(speed, height, gravity)
 
 
-def bench_cast_fraction(speed: float, width: float, height: float, gravity: float = 9.81) -> float:
-    """Share of the mass of a bench with a vertical face that comes down past it, thrown level.
-
-    With the reach R of its top, a point `d` behind the face and `z` over the floor comes past if
-    d < R sqrt(z / height); the share is that of the area of the section: 2 R / (3 width) for
-    R <= width, else 1 - (width / R)^2 / 3.
-    """
-    reach = level_reach(speed, height, gravity)
-    if reach <= width:
-        return 2.0 / 3.0 * reach / width
-    return 1.0 - (width / reach) ** 2 / 3.0
-
-
 def ballistic_cast(
     before: Particles,
     block_velocity: FloatArray,

@@ -202,18 +202,3 @@ def band(values: Sequence[ArrayLike]) -> Band:
         square = np.where(known, (table - mean) ** 2, 0.0).sum(axis=0)
         sd = np.sqrt(square / np.where(n > 1, n - 1, np.nan))
     return Band(np.asarray(mean), np.asarray(sd), np.asarray(n, dtype=np.int64))
-
-
-def metric_bands(runs: Sequence[PileMetrics]) -> dict[str, Band]:
-    """Band of every metric over runs of one bench, such as those of several seeds.
-
-    Raises
-    ------
-    ValueError
-        The runs do not have the same blocks.
-    """
-    shapes = {run.block_throw.shape for run in runs}
-    if len(shapes) != 1:
-        message = f"runs of one bench have the same blocks; found {sorted(shapes)}"
-        raise ValueError(message)
-    return {name: band([getattr(run, name) for run in runs]) for name in PileMetrics._fields}

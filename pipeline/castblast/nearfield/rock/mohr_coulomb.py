@@ -36,7 +36,6 @@ from castblast.nearfield.rock.single_plane import (
     TOLERANCE,
     PlaneStrength,
     admissible,
-    single_plane_return,
 )
 
 FloatArray: TypeAlias = NDArray[np.float64]
@@ -256,10 +255,12 @@ def _share(first: int, second: int, third: int, plane: int, a: float, b: float, 
 
 
 @kernel
-def return_to_yield(
+def edge_return(
     model: YieldModel, radial: float, hoop: float, axial: float, ucs: float, tension: float
 ) -> ReturnedStress:
-    """Return a trial stress to the strength surface; an admissible one is left as it is.
+    """Return a trial stress to an edge or corner: try the sets of two and three active planes.
+
+    For what `castblast.nearfield.rock.single_plane.single_plane_return` does not solve.
 
     Parameters
     ----------
@@ -271,20 +272,6 @@ def return_to_yield(
     tension : float [Pa]
         Tensile strength, at most `ucs` / (N - 1).
     """
-    one = single_plane_return(model.planes, radial, hoop, axial, ucs, tension)
-    if one.solved:
-        return ReturnedStress(
-            one.radial, one.hoop, one.axial, one.shear_radial, one.shear_hoop, one.shear_axial,
-            one.opening_radial, one.opening_hoop, one.opening_axial, one.shear, one.opening, False,
-        )  # fmt: skip
-    return edge_return(model, radial, hoop, axial, ucs, tension)
-
-
-@kernel
-def edge_return(
-    model: YieldModel, radial: float, hoop: float, axial: float, ucs: float, tension: float
-) -> ReturnedStress:
-    """Edges and corners: try the active sets of two and three planes; see `return_to_yield`."""
     size, inverse = model.size, model.inverse
     planes = model.planes
     friction, dilation = planes.friction, planes.dilation

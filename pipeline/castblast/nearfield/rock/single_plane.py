@@ -75,7 +75,7 @@ class SinglePlane(NamedTuple):
     shear_excess, tensile_excess : float [Pa]
         How far the trial lies beyond either plane; negative inside.
     solved : bool
-        False: an edge or a corner is needed, `return_to_yield` finds it.
+        False: an edge or a corner is needed, `mohr_coulomb.edge_return` finds it.
     """
 
     radial: float
@@ -101,7 +101,7 @@ def single_plane_return(
     """Return a trial stress by the one plane that nearly every return needs.
 
     Without a branch, so that a loop over many rocks becomes vector code: whatever does not apply
-    is computed all the same and not selected. Arguments as in `return_to_yield`.
+    is computed all the same and not selected. Arguments as in `mohr_coulomb.edge_return`.
     """
     friction, dilation = strength.friction, strength.dilation
     lame, twice_shear = strength.lame, strength.twice_shear

@@ -6,13 +6,11 @@ import os
 from pathlib import Path
 from typing import Any
 
-from castblast.dataset.building.produce import Built, build_dataset, build_recipe, output_path
-from castblast.dataset.file.provenance import ExplosiveSource
+from castblast.dataset.building.produce import Built, build_recipe, output_path
 from castblast.dataset.file.store import reading_dataset
-from castblast.dataset.rows.simulation import Simulator
 from castblast.disk.plain import as_plain
 from castblast.progress import ProgressCallback, silent
-from castblast.specs.recipe import RecipeSource, load_recipe
+from castblast.specs.recipe import load_recipe
 from castblast.stages.outcome import Outcome
 
 
@@ -70,31 +68,6 @@ def generate(
     built = build_recipe(
         source,
         output_path(source, out),
-        workers=workers,
-        scheduler=scheduler,
-        restart=restart,
-        progress=progress,
-    )
-    return generated(built)
-
-
-def produce(
-    source: RecipeSource,
-    explosives: tuple[ExplosiveSource, ...],
-    simulator: Simulator,
-    path: Path,
-    *,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    restart: bool = False,
-    progress: ProgressCallback = silent,
-) -> GenerateOutcome:
-    """Build a dataset with a given simulator; see `generate`."""
-    built = build_dataset(
-        source,
-        explosives,
-        simulator,
-        path,
         workers=workers,
         scheduler=scheduler,
         restart=restart,

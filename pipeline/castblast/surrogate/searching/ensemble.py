@@ -8,13 +8,11 @@ members get wrong alike it does not show. The band stays the conformal one.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from castblast.errors import SpecError
-from castblast.network import Column, Network
 from castblast.progress import ProgressCallback, part, silent
 from castblast.specs.models.model import ModelSpec
 from castblast.surrogate.fitting.estimators import predict
@@ -56,23 +54,3 @@ def ensemble_spread(fits: Sequence[Fit], frame: pd.DataFrame) -> FloatArray:
     """Relative standard deviation over the fits, (n, m): over the absolute value of the first."""
     answers = np.stack([predict(fit.estimator, frame) for fit in fits])
     return np.asarray(np.std(answers, axis=0, ddof=1) / np.abs(answers[0]))
-
-
-def with_members(network: Network, others: Sequence[Network]) -> Network:
-    """Give a network the layers of others as members, so that the spread travels with it.
-
-    Raises
-    ------
-    SpecError
-        Another network has other inputs, codes or scalings.
-    """
-    for other in others:
-        if _scaling(other) != _scaling(network) or not np.array_equal(other.codes, network.codes):
-            message = "members need the inputs, codes and scalings of the network"
-            raise SpecError(message)
-    return replace(network, members=tuple(other.layers for other in others))
-
-
-def _scaling(network: Network) -> list[tuple[str, str, float, float]]:
-    columns: tuple[Column, ...] = network.inputs + network.derived + network.outputs
-    return [(column.name, column.transform, column.mean, column.scale) for column in columns]
