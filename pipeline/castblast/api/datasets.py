@@ -21,9 +21,9 @@ from castblast.dataset.file.schema import (
     flag_names,
     label_attributes,
     names_with_role,
+    varying_inputs,
 )
 from castblast.dataset.file.store import reading_dataset
-from castblast.design.variables import INPUT_NAMES
 from castblast.errors import DatasetError, nearest_name
 from castblast.extras import require
 from castblast.specs.recipe import SPLIT_NAMES, load_recipe
@@ -214,14 +214,7 @@ class CastblastAccessor:
     @property
     def features(self) -> tuple[str, ...]:
         """Inputs that the dataset varies, those that follow from others left out."""
-        return tuple(
-            name
-            for name in INPUT_NAMES
-            if name in self._dataset.data_vars
-            and self._dataset[name].dims == ("sample",)
-            and self._dataset[name].attrs.get("role", "input") == "input"
-            and float(np.ptp(self._dataset[name].to_numpy())) > 0.0
-        )
+        return varying_inputs(self._dataset)
 
     @property
     def targets(self) -> tuple[str, ...]:

@@ -17,10 +17,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from castblast.dataset.file.schema import flag_names
+from castblast.dataset.file.schema import flag_names, varying_inputs
 from castblast.design.variables import VARIABLES
 from castblast.errors import DatasetError
-from castblast.surrogate.fitting.features import varying_inputs
 from castblast.types import FloatArray
 
 if TYPE_CHECKING:

@@ -10,6 +10,7 @@ import xarray as xr
 
 import castblast as cb
 from castblast.api.datasets import decoded, encoded
+from castblast.dataset.file.schema import varying_inputs
 from castblast.dataset.file.store import open_dataset as open_stored
 from castblast.errors import DatasetError, SpecError
 from castblast.specs.models.model import read_model_spec
@@ -55,6 +56,18 @@ def test_in_memory_it_is_the_same_and_leaves_no_file(
     assert not list(tmp_path.iterdir())
     assert max(seen) == 1.0
     monkeypatch.undo()
+
+
+def test_features_are_columns_whose_role_is_input_or_not_said(dataset: xr.Dataset) -> None:
+    """A role that is no text, such as an array, is none."""
+    marked = dataset.load().copy(deep=True)
+    found = dataset.castblast.features
+    assert {"burden", "ucs", "young_modulus"} < set(found)
+    del marked["burden"].attrs["role"]
+    marked["ucs"].attrs["role"] = np.array([1, 2])
+    marked["young_modulus"].attrs["role"] = "derived"
+    left = tuple(name for name in found if name not in ("ucs", "young_modulus"))
+    assert marked.castblast.features == varying_inputs(marked) == left
 
 
 def test_another_seed_gives_other_rows() -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from castblast.design.variables import VARIABLES
+from castblast.design.variables import INPUT_NAMES, VARIABLES
 from castblast.errors import DatasetError, Status
 from castblast.specs.recipe import SPLIT_NAMES
 from castblast.types import BoolArray
@@ -160,6 +160,26 @@ def names_with_role(dataset: xr.Dataset, role: str) -> tuple[str, ...]:
         for name, variable in dataset.variables.items()
         if role_of(variable) == role and name in VARIABLES
     )
+
+
+def varying_inputs(dataset: xr.Dataset) -> tuple[str, ...]:
+    """Inputs that the design of a dataset varies, those derived from others left out.
+
+    A column that says nothing of its role is an input.
+    """
+    return tuple(
+        name
+        for name in INPUT_NAMES
+        if name in dataset.data_vars
+        and is_column(dataset[name])
+        and ("role" not in dataset[name].attrs or role_of(dataset[name]) == "input")
+        and float(np.ptp(dataset[name].to_numpy())) > 0.0
+    )
+
+
+def is_column(variable: xr.DataArray) -> bool:
+    """Whether a variable holds a number for each sample."""
+    return variable.dims == ("sample",) and variable.dtype.kind in "fiub"
 
 
 def role_of(variable: xr.Variable | xr.DataArray) -> str:

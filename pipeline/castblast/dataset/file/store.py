@@ -18,7 +18,7 @@ from typing import Any
 
 import xarray as xr
 
-from castblast.dataset.file.schema import SCHEMA, SCHEMA_VERSION
+from castblast.dataset.file.schema import SCHEMA, SCHEMA_VERSION, role_of
 from castblast.disk.files import write_with
 from castblast.errors import DatasetError, OutputError
 from castblast.names import is_label, shortened
@@ -189,7 +189,7 @@ def _define(file: Any, form: xr.Dataset, rows: int) -> None:
     for name, size in form.sizes.items():
         file.createDimension(name, rows if name == "sample" else size)
     for key, variable in form.variables.items():
-        holes = variable.dtype.kind == "f" and variable.attrs.get("role") in _HOLES
+        holes = variable.dtype.kind == "f" and role_of(variable) in _HOLES
         settings: dict[str, Any] = {}
         if "sample" in variable.dims and rows:
             chunk = (min(rows, CHUNK_ROWS), *variable.shape[1:])

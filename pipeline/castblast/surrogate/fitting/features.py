@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from castblast.dataset.file.schema import flag_names
+from castblast.dataset.file.schema import flag_names, is_column, role_of, varying_inputs
 from castblast.design.variables import INPUT_NAMES, VARIABLES
 from castblast.errors import DatasetError, nearest_name
 from castblast.network import Constraint, InputColumn, Transform
@@ -151,7 +151,7 @@ def read_table(dataset: xr.Dataset, features: Sequence[str], targets: Sequence[s
     faults += [
         f"{name}: is no column of numbers, one per sample"
         for name in (*features, *targets, "explosive", "split", "status", "sample")
-        if name in dataset.variables and not _is_column(dataset[name])
+        if name in dataset.variables and not is_column(dataset[name])
     ]
     if faults:
         raise DatasetError("\n".join(faults))
@@ -186,23 +186,6 @@ def expand(features: Sequence[str], varying: Sequence[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
-def varying_inputs(dataset: xr.Dataset) -> tuple[str, ...]:
-    """Inputs that the design of a dataset varies, those derived from others left out."""
-    return tuple(
-        name
-        for name in INPUT_NAMES
-        if name in dataset.data_vars
-        and _is_column(dataset[name])
-        and dataset[name].attrs.get("role", "input") == "input"
-        and float(np.ptp(dataset[name].to_numpy())) > 0.0
-    )
-
-
-def _is_column(variable: xr.DataArray) -> bool:
-    """Whether a variable holds a number for each sample."""
-    return variable.dims == ("sample",) and variable.dtype.kind in "fiub"
-
-
 def _descriptors(dataset: xr.Dataset) -> dict[str, dict[str, float]]:
     """Numbers per explosive, by its name; none in datasets without them."""
     if "explosive_name" not in dataset.variables:
@@ -210,7 +193,7 @@ def _descriptors(dataset: xr.Dataset) -> dict[str, dict[str, float]]:
     numbers = {
         str(name).removeprefix("explosive_"): values.to_numpy()
         for name, values in dataset.data_vars.items()
-        if values.attrs.get("role") == "descriptor"
+        if role_of(values) == "descriptor"
     }
     return {
         str(name): {key: float(values[k]) for key, values in numbers.items()}
@@ -222,7 +205,7 @@ def _held(dataset: xr.Dataset, features: Sequence[str]) -> dict[str, float]:
     """Inputs beside the features that have one value in every row."""
     held = {}
     for name in INPUT_NAMES:
-        if name in dataset.data_vars and name not in features and _is_column(dataset[name]):
+        if name in dataset.data_vars and name not in features and is_column(dataset[name]):
             values = np.unique(dataset[name].to_numpy())
             if len(values) == 1:
                 held[name] = float(values[0])

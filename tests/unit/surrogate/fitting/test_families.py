@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from castblast.dataset.file.schema import varying_inputs
 from castblast.errors import DatasetError, SpecError
 from castblast.network import domain_faults, evaluate
 from castblast.specs.models.model import (
@@ -24,7 +25,7 @@ from castblast.specs.models.model import (
 )
 from castblast.surrogate.fitting import estimators
 from castblast.surrogate.fitting.families.build import make_model
-from castblast.surrogate.fitting.features import Table, read_table, varying_inputs
+from castblast.surrogate.fitting.features import Table, read_table
 from castblast.surrogate.fitting.training import Fit, fit_spec
 
 LOGS = {"input_transform": "log", "target_transform": "log"}
