@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -14,7 +14,6 @@ from castblast.api.model import Model
 from castblast.api.shared.frames import frame
 from castblast.api.shared.markup import box, table
 from castblast.api.shared.reporting import Progress, reporter
-from castblast.bands import BAND_WORDS
 from castblast.disk.files import write_text
 from castblast.disk.resources import shipped_specs
 from castblast.errors import SpecError
@@ -23,6 +22,7 @@ from castblast.progress import part
 from castblast.specs.models.model import (
     ModelSpec,
     SurrogateSpec,
+    make_model_spec,
     read_model_spec,
     refuse_code,
 )
@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from castblast.surrogate.fitting.training import Fit
     from castblast.surrogate.judging.comparison import ComparisonDocument
 
-#: What the face takes as a spec: a shipped name, a file, or a spec.
-Spec: TypeAlias = Union[str, Path, "SurrogateSpec"]
+#: What the face takes as a spec: a shipped name, a file, the content of one, or a spec.
+Spec: TypeAlias = Union[str, Path, Mapping[str, Any], "SurrogateSpec"]
 Source: TypeAlias = Union[str, Path, "xr.Dataset"]
 
 
@@ -56,8 +56,8 @@ def fit(
     ----------
     dataset : Dataset or path
         As of `castblast.open_dataset` or `castblast.generate`.
-    spec : str, path or ModelSpec
-        Name of a spec that comes with castblast, a YAML file, or a spec.
+    spec : str, path, mapping or ModelSpec
+        Name of a spec that comes with castblast, a YAML file, its content with a `name`, or a spec.
     seed : int, optional
         Instead of that of the spec.
     allow_code : bool
@@ -108,7 +108,7 @@ def compare(
     Parameters
     ----------
     dataset : Dataset or path
-    specs : sequence of str, path or ModelSpec, optional
+    specs : sequence of str, path, mapping or ModelSpec, optional
         Default: all that come with castblast; those whose libraries are missing are left out.
     quick : bool
         Fewer rows, iterations and starts: a first look.
@@ -126,7 +126,7 @@ def compare(
     Raises
     ------
     MissingLibraryError, SpecError, DatasetError
-        As `castblast.fit`; no model that can be exported.
+        As `castblast.fit`; two specs of one name; no model that can be exported.
 
     Examples
     --------
@@ -143,6 +143,7 @@ def compare(
     extent = QUICK if quick else FULL
     given = shipped_specs("model spec").values() if specs is None else specs
     wanted = [_read_spec(spec) for spec in given]
+    _require_distinct(wanted)
     refuse_code(wanted, allowed=allow_code)
     remarks: list[str] = []
     wanted = without_missing([s.quick() if quick else s for s in wanted], remarks)
@@ -260,8 +261,11 @@ class Comparison:
             ]
             for entry in league["league"]
         ]
-        lead = f"95th-percentile relative error on {league['test_rows']} held-out rows"
-        return box(repr(self).strip("<>"), table(header, rows), lead=f"{lead}; {BAND_WORDS}")
+        lead = (
+            f"95th-percentile relative error on {league['test_rows']} held-out rows: how closely a "
+        )
+        lead += "model repeats the simulator, no statement about a blast"
+        return box(repr(self).strip("<>"), table(header, rows), lead=lead)
 
 
 def model_of(made: Fit) -> Model:
@@ -286,13 +290,26 @@ def _evaluate(
 
 
 def _read_spec(spec: Spec, seed: int | None = None) -> ModelSpec:
-    read: Any = spec if isinstance(spec, SurrogateSpec) else read_model_spec(Path(spec))
+    read: Any = spec
+    if isinstance(spec, Mapping):
+        read = make_model_spec(spec, str(spec.get("name", "spec")), Path())
+    elif not isinstance(spec, SurrogateSpec):
+        read = read_model_spec(Path(spec))
     if seed is None:
         return read  # type: ignore[no-any-return]  # one of the families of ModelSpec
     if "seed" not in type(read).model_fields:
         message = f"seed: models of kind {read.kind} have none"
         raise SpecError(message, field="seed", value=seed)
     return read.model_copy(update={"seed": int(seed)})  # type: ignore[no-any-return]
+
+
+def _require_distinct(specs: Sequence[ModelSpec]) -> None:
+    """Models are kept, ranked and found by their names."""
+    names = [spec.name for spec in specs]
+    for name in names:
+        if names.count(name) > 1:
+            message = f"specs: name: '{name}' is that of {names.count(name)} specs"
+            raise SpecError(message, field="specs", value=name)
 
 
 def _table(dataset: Source, specs: Sequence[ModelSpec]) -> Table:

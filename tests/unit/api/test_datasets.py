@@ -13,7 +13,7 @@ from castblast.api.datasets import decoded, encoded
 from castblast.dataset.file.schema import varying_inputs
 from castblast.dataset.file.store import open_dataset as open_stored
 from castblast.errors import DatasetError, SpecError
-from castblast.specs.models.model import read_model_spec
+from castblast.specs.models.model import make_model_spec, read_model_spec
 from castblast.surrogate.fitting.rows import read_rows
 from castblast.surrogate.fitting.training import fit_spec
 
@@ -142,6 +142,33 @@ def test_a_fit_is_that_of_the_command_line(dataset: xr.Dataset, folder: Path) ->
         assert row["rows"] == scores[name].rows
 
 
+def test_a_spec_may_be_its_content(dataset: xr.Dataset) -> None:
+    content = {"name": "square", "kind": "ridge", "degree": 2, "input_transform": "log"}
+    made = cb.fit(dataset, content)
+    assert made.name == "square"
+    spec = make_model_spec(content, "square", Path())
+    assert np.array_equal(made.fitted.predicted, cb.fit(dataset, spec).fitted.predicted)
+    for change, words in (
+        ({"name": None}, "name"),
+        ({"kind": "rigde"}, "did you mean 'ridge'"),
+        ({"degre": 2}, "did you mean 'degree'"),
+    ):
+        with pytest.raises(SpecError, match=words):
+            cb.fit(dataset, {**content, **change})
+
+
+def test_code_is_refused_in_words_of_python(dataset: xr.Dataset) -> None:
+    spec = {"name": "mine", "kind": "custom", "factory": "my_models:make"}
+    with pytest.raises(SpecError, match="in Python allow_code=True"):
+        cb.fit(dataset, spec)
+
+
+def test_two_specs_of_one_name_are_refused(dataset: xr.Dataset) -> None:
+    with pytest.raises(SpecError, match="'ridge' is that of 2 specs") as caught:
+        cb.compare(dataset, ["ridge", {"name": "ridge", "kind": "ridge", "degree": 2}])
+    assert caught.value.field == "specs"
+
+
 def test_a_seed_is_taken_or_refused(dataset: xr.Dataset) -> None:
     with pytest.raises(SpecError, match="seed: models of kind ridge have none"):
         cb.fit(dataset, "ridge", seed=3)
@@ -212,6 +239,7 @@ def test_a_comparison_in_memory(
     assert set(found.models) == set(found.league.index)
     text = " ".join(ElementTree.fromstring(found._repr_html_()).itertext())
     assert "held-out rows" in text
+    assert "no statement about a blast" in text
     assert not list(tmp_path.iterdir())
     page = found.report("report.html").read_text()
     assert "data:image/png;base64" in page

@@ -121,7 +121,7 @@ def refuse_code(specs: Iterable[ModelSpec], *, allowed: bool) -> None:
     """
     lines = [
         f"{spec.name}: kind custom runs Python code, {spec.factory}, looked for in {spec.folder} "
-        "first; read it, then add --allow-code"
+        "first; read it, then allow it: --allow-code, in Python allow_code=True"
         for spec in specs
         if isinstance(spec, CustomSpec) and not allowed
     ]
