@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from castblast.api.shared.frames import cf_attributes, frame, library
-from castblast.api.shared.markup import bar, box, table
+from castblast.api.shared.markup import bar, box, folded, table
 from castblast.api.shared.values import Quantity
 from castblast.bands import BAND_TITLE, BAND_WORDS, band_document, show_band, show_value
 from castblast.blast.run import (
@@ -40,6 +40,8 @@ _BURDEN = (
     "floor_work",
     "final_gas_energy",
 )
+#: Roles of inputs that describe the blast; the others are parameters of the models.
+_DESIGN = ("rock", "hole", "bench")
 _NEAR_HISTORY = {
     "pressure": ("Pa", "gas pressure in the hole"),
     "hole_radius": ("m", "radius of the hole wall"),
@@ -195,7 +197,6 @@ class Blast:
         return f"<Blast of {self.explosive}: {shown}>"
 
     def _repr_html_(self) -> str:
-        given = [(as_words(q.name), VARIABLES[q.name].show(q)) for q in self.inputs.values()]
         units = {name: VARIABLES[name].shown_unit for name in self.outputs}
         found = [
             (as_words(name), show_value(name, q), show_band(name, q), units[name])
@@ -207,10 +208,21 @@ class Blast:
         return box(
             f"{self.explosive}, {self.mode} mode, {self.parameters} parameters",
             table(("output", "value", BAND_TITLE, "unit"), found),
-            table(("input", "value"), given),
+            self._html_inputs(),
             bar(shares, f"where {work * 1e-6:.3g} MJ/m of gas work goes"),
             lead=BAND_WORDS,
         )
+
+    def _html_inputs(self) -> str:
+        """The design as a table, and folded below it the parameters of the models."""
+        rows: dict[bool, list[tuple[str, str]]] = {True: [], False: []}
+        for name, value in self.inputs.items():
+            variable = VARIABLES[name]
+            rows[variable.role in _DESIGN].append((as_words(name), variable.show(value)))
+        design, parameters = rows[True], rows[False]
+        inner = table(("parameter", "value"), parameters)
+        words = f"{len(parameters)} parameters of the models"
+        return table(("input", "value"), design) + folded(words, inner)
 
 
 def _history(

@@ -330,8 +330,7 @@ class Model:
 
     def _repr_html_(self) -> str:
         inputs = [
-            (as_words(c.name), f"{VARIABLES[c.name].show(c.lower)} to {c.show(c.upper)}")
-            for c in self._network.inputs
+            (as_words(c.name), _range(c.name, c.lower, c.upper)) for c in self._network.inputs
         ]
         outputs = [
             (
@@ -348,6 +347,13 @@ class Model:
             table(("explosive",), [(name,) for name in self._network.explosives]),
             lead=BAND_WORDS,
         )
+
+
+def _range(name: str, lower: float, upper: float) -> str:
+    """Training range for people, to three figures; the exact ends are in `Model.inputs`."""
+    variable = VARIABLES[name]
+    ends = " to ".join(f"{end * variable.display_factor:.3g}" for end in (lower, upper))
+    return ends if variable.shown_unit == "1" else f"{ends} {variable.shown_unit}"
 
 
 def load_model(name_or_path: str | Path = "full") -> Model:

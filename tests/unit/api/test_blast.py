@@ -107,6 +107,17 @@ def test_html_is_well_formed_and_names_the_band(blast: "cb.api.blast.Blast") -> 
     assert "burden velocity" in text
 
 
+def test_html_shows_the_design_and_folds_the_parameters(blast: "cb.api.blast.Blast") -> None:
+    page = ElementTree.fromstring(blast._repr_html_())
+    (folded,) = page.iter("details")
+    heads = [set(part.itertext()) for part in (page, folded)]
+    for name in blast.inputs:
+        words = name.replace("_", " ")
+        assert words in heads[0]
+        is_parameter = cb.variables().loc[name, "role"] in ("burden_model", "solver")
+        assert (words in heads[1]) == is_parameter
+
+
 def test_a_blast_cannot_be_changed_and_travels(blast: "cb.api.blast.Blast") -> None:
     with pytest.raises(AttributeError):
         blast.mode = "paper"

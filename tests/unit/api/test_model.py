@@ -114,6 +114,8 @@ def test_what_a_model_says_of_itself(model: "cb.Model") -> None:
     text = " ".join(ElementTree.fromstring(model._repr_html_()).itertext())
     assert "prediction band" in text
     assert "network band" in text
+    lower, upper = (model.inputs.loc["ucs", end] * 1e-6 for end in ("lower", "upper"))
+    assert f"{lower:.3g} to {upper:.3g} MPa" in text
 
 
 def test_a_missing_library_is_named(model: "cb.Model", monkeypatch: pytest.MonkeyPatch) -> None:

@@ -47,6 +47,11 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]], caption: str = "
     )
 
 
+def folded(title: str, content: str) -> str:
+    """Some HTML that is shown when its title is clicked."""
+    return f'<details><summary style="opacity:.75">{escape(title)}</summary>{content}</details>'
+
+
 def bar(parts: Sequence[tuple[str, float]], caption: str) -> str:
     """Shares of a whole as one bar with a legend; shares of nothing are left out.
 
