@@ -32,6 +32,7 @@ ELSEWHERE = {
     "models/README.md": "models.md",
     "pipeline/notebooks/engineer.ipynb": "notebooks/engineer.md",
     "pipeline/notebooks/data_maker.ipynb": "notebooks/data_maker.md",
+    "pipeline/notebooks/modeller.ipynb": "notebooks/modeller.md",
 }
 _LINK = re.compile(r"(!?)\[([^\]]*)\]\((?!https?:|mailto:|#)([^)\s#]+)(#[^)\s]*)?\)")
 #: Not for the reader of a reference.
