@@ -1,10 +1,8 @@
 """A stand-in for the physics: the real inputs and rules, a closed form instead of a simulation.
 
-Lets the machinery of datasets be tested in a moment. Run as a script it builds a dataset slowly,
-for tests that kill it.
+Lets the machinery of datasets be tested in a moment.
 """
 
-import sys
 import time
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -95,9 +93,3 @@ def fake_generate(recipe: Path, path: Path, *, simulator=None, **options) -> Gen
     source = load_recipe(recipe)
     simulator = simulator or fake_simulator(recipe)
     return generated(build_dataset(source, load_explosives(source), simulator, path, **options))
-
-
-if __name__ == "__main__":
-    file = Path(sys.argv[1])
-    slow = fake_simulator(file, seconds=float(sys.argv[3]))
-    fake_generate(file, Path(sys.argv[2]), simulator=slow, workers=2)

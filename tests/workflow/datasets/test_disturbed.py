@@ -207,6 +207,7 @@ def test_files_that_may_not_grow(tmp_path, undisturbed):
     process = start(tmp_path, 0.0, "--workers", 2, preexec_fn=bounded)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 2, errors
+    assert len([line for line in errors.splitlines() if line.startswith("error: ")]) == 1
     assert "cannot be written" in errors
     assert "Traceback" not in errors
     assert not (tmp_path / "data.nc").exists()

@@ -12,7 +12,7 @@ from castblast.dataset.building.extend import read_existing
 from castblast.dataset.file.check import check
 from castblast.dataset.file.compare import compare
 from castblast.dataset.file.store import open_dataset
-from castblast.errors import CastblastError, CheckError, SimulationError, SpecError
+from castblast.errors import CheckError, SimulationError, SpecError
 from castblast.stages.datasets.dataset import describe_dataset
 from castblast.stages.datasets.diff import diff_datasets
 from castblast.stages.datasets.extend import produce_extension
@@ -234,9 +234,3 @@ def test_diff_of_recipes(made, tmp_path):
     assert "seed: 7 → 8" in text
     assert "explosive: flag_meanings" in text
     assert ("number of explosives", "1", "changed", "") in outcome.rows
-
-
-def test_diff_of_something_unreadable(made, tmp_path):
-    (tmp_path / "data.nc").write_text("no dataset")
-    with pytest.raises(CastblastError, match="is not a netCDF file"):
-        diff_datasets(made, tmp_path / "data.nc")

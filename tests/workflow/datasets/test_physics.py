@@ -148,24 +148,3 @@ def test_physics_of_the_rows(file):
     start = dataset["explosive_initial_pressure"].to_numpy()[dataset["explosive"].to_numpy()[ok]]
     assert np.all(pressure <= start[:, None] * (1 + 1e-6))
     assert set(flag_names(dataset["split"])) <= {"train", "valid", "calibration", "test"}
-
-
-def test_bad_recipe_is_one_line_per_fault_and_no_file(castblast, tmp_path):
-    path = tmp_path / "bad.yaml"
-    path.write_text("name: bad\nversion: 1.0.0\ntitle: bad\nsize: 0\nsed: 1\nvariables: {}\n")
-    done = castblast("generate", path, "--out", tmp_path / "out")
-    assert done.returncode == 2
-    assert "did you mean 'seed'?" in done.stderr
-    assert "Traceback" not in done.stderr
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize("verb", ["check", "describe", "reproduce"])
-def test_unreadable_dataset_is_one_line(castblast_here, file, tmp_path, verb):
-    path = tmp_path / "data.nc"
-    content = file.read_bytes()
-    path.write_bytes(content[: len(content) // 2])
-    done = castblast_here("dataset", verb, path)
-    assert done.returncode == 2
-    assert len(done.stderr.strip().splitlines()) == 1
-    assert "is truncated or damaged" in done.stderr

@@ -1,11 +1,6 @@
 """Builds stopped, damaged, repeated or spread out end in the same bytes, or say why not."""
 
 import json
-import os
-import signal
-import subprocess
-import sys
-import time
 from contextlib import nullcontext
 
 import numpy as np
@@ -57,23 +52,6 @@ def test_same_bytes_for_any_number_of_workers(tmp_path, undisturbed, workers):
     assert not (tmp_path / "data.work").exists()
 
 
-def test_same_bytes_over_a_running_cluster(tmp_path, undisturbed):
-    """Tasks travel over TCP to workers that are not ours."""
-    from dask.distributed import LocalCluster
-
-    with LocalCluster(
-        n_workers=2,
-        threads_per_worker=1,
-        processes=False,
-        protocol="tcp",
-        dashboard_address="127.0.0.1:0",
-        memory_limit=0,
-    ) as cluster:
-        recipe = write_recipe(tmp_path / "r.yaml")
-        fake_generate(recipe, tmp_path / "data.nc", scheduler=cluster.scheduler_address)
-    assert contents(tmp_path) == undisturbed
-
-
 def test_no_scheduler_there(tmp_path, monkeypatch):
     monkeypatch.setattr("castblast.dataset.building.build._CONNECT_SECONDS", 0.5)
     recipe = write_recipe(tmp_path / "r.yaml")
@@ -119,49 +97,6 @@ def test_damaged_shards_are_made_again(tmp_path, undisturbed, damage):
     outcome = fake_generate(recipe, tmp_path / "data.nc")
     assert "1 cut shard moved aside" in outcome.lines[0]
     assert contents(tmp_path) == undisturbed
-
-
-def test_kill_in_mid_run(tmp_path, undisturbed):
-    """SIGKILL while shards are being written; the same command then finishes the work."""
-    recipe = write_recipe(tmp_path / "r.yaml")
-    stop_when_half_done(tmp_path, recipe, signal.SIGKILL)
-    outcome = fake_generate(recipe, tmp_path / "data.nc")
-    assert outcome.lines[0].startswith("resume: ")
-    assert contents(tmp_path) == undisturbed
-
-
-@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
-def test_interrupt_keeps_the_shards(tmp_path, undisturbed):
-    """Ctrl-C: stops soon, no half file, the same command goes on."""
-    recipe = write_recipe(tmp_path / "r.yaml")
-    begin = time.monotonic()
-    errors = stop_when_half_done(tmp_path, recipe, signal.SIGINT)
-    assert "KeyboardInterrupt" in errors.splitlines()[-1]
-    assert "distributed" not in errors.replace("site-packages", "").split("Traceback")[0]
-    assert time.monotonic() - begin < 60
-    assert not list(tmp_path.rglob("*.tmp.nc"))
-    fake_generate(recipe, tmp_path / "data.nc")
-    assert contents(tmp_path) == undisturbed
-
-
-def stop_when_half_done(folder, recipe, how):
-    import fake_blast
-
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    process = subprocess.Popen(
-        [sys.executable, fake_blast.__file__, recipe, folder / "data.nc", "0.4"],
-        stderr=subprocess.PIPE,
-        text=True,
-        env=environment,
-    )
-    deadline = time.monotonic() + 60
-    while len(shards(folder)) < 2 and time.monotonic() < deadline and process.poll() is None:
-        time.sleep(0.02)
-    process.send_signal(how)
-    _, errors = process.communicate(timeout=60)
-    assert 2 <= len(shards(folder)) < SHARDS, errors
-    assert not (folder / "data.nc").exists()
-    return errors
 
 
 def test_finished_dataset_is_left_alone(tmp_path):
