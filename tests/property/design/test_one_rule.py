@@ -138,23 +138,6 @@ def test_columns_are_answered_as_single_designs(rows):
         )
 
 
-@given(st.floats(1.5, 10.0), st.floats(0.08, 0.3), st.floats(10.0, 30.0))
-@settings(max_examples=60, deadline=None)
-def test_what_is_missing_follows_the_table(burden, diameter, height):
-    """Spacing the burden, charge as wide as the hole, 0.7 burden of stemming, charge the rest."""
-    for name, network in NETWORKS.items():
-        given_values = {"burden": burden, "hole_diameter": diameter, "bench_height": height}
-        found = predict(given_values, "anfo", network)["inputs"]
-        expected = {
-            **given_values,
-            "spacing": burden,
-            "stemming_length": 0.7 * burden,
-            "charge_length": height - 0.7 * burden,
-        }
-        for key in set(expected) & set(network.input_names):
-            assert found[key] == expected[key], (name, key)
-
-
 @given(designs())
 @settings(max_examples=100, deadline=None)
 def test_faults_do_not_depend_on_the_order_in_which_inputs_are_given(values):
@@ -168,21 +151,6 @@ def test_a_completed_design_completes_to_itself(values):
     once = outcome(lambda: resolve_design(values))
     if isinstance(once, dict):
         assert resolve_design(once) == once
-
-
-def test_charge_and_stemming_name_one_design():
-    """The same hole by its charge and by its stemming: the same numbers, band and verdict."""
-    network = NETWORKS["full"]
-    bench = {"burden": 3.0, "hole_diameter": 0.15, "bench_height": 10.0}
-    by_charge = predict(bench | {"charge_length": 7.3}, "anfo", network)
-    by_stemming = predict(bench | {"stemming_length": 2.7}, "anfo", network)
-    both = predict(bench | {"stemming_length": 2.7, "charge_length": 7.3}, "anfo", network)
-    assert by_charge["domain"] == by_stemming["domain"] == both["domain"] == "inside"
-    for name in network.output_names:
-        assert by_charge[name] == pytest.approx(by_stemming[name], rel=1e-12)
-        assert by_charge["network_band"][name]["upper"] == pytest.approx(
-            by_stemming["network_band"][name]["upper"], rel=1e-12
-        )
 
 
 def test_a_limit_met_by_rounding_is_met():

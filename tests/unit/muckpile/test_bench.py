@@ -17,7 +17,6 @@ from castblast.muckpile.bench.geometry import (
     block_velocities,
     check_bench,
     crest_position,
-    echelon_delays,
     row_delays,
     v_delays,
 )
@@ -60,15 +59,6 @@ def test_blocks_are_numbered_from_the_face_and_along_it():
     place = np.array([[-0.1, 0.1, 1.0], [-0.1, 8.9, 1.0], [-3.1, 0.1, 9.0], [0.5, 99.0, 0.0]])
     assert assign_blocks(place, bench).tolist() == [0, 2, 3, 2]
     assert block_shape(Bench()) == (8, 28)
-
-
-def test_echelon_of_the_published_pattern():
-    """Neighbours fire 30 ms apart: T = T0 + (row + column) 30 ms, the last at 34 intervals."""
-    times = echelon_delays(8, 28, 0.030, 0.5).reshape(8, 28)
-    assert times[0, 0] == 0.5
-    assert times.max() == pytest.approx(0.5 + 34 * 0.030)
-    np.testing.assert_allclose(np.diff(times, axis=0), 0.030)
-    np.testing.assert_allclose(np.diff(times, axis=1), 0.030)
 
 
 def test_rows_and_v():

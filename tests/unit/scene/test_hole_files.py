@@ -13,7 +13,7 @@ from castblast.api.muckpile.tables import block_columns
 from castblast.errors import SpecError
 from castblast.muckpile.bench.geometry import Bench
 from castblast.scene.plan import make_plan
-from castblast.specs.bench.bench import BenchSpec, load_bench
+from castblast.specs.bench.bench import load_bench
 from castblast.specs.bench.frame import FrameSpec, suggest_frame
 from castblast.specs.bench.holes import Holes, read_holes
 from castblast.specs.bench.ore import read_ore
@@ -183,24 +183,18 @@ def test_connectors(rows: str, line: str, tmp_path: Path) -> None:
     assert times == pytest.approx({"A": 0.0, "B": 0.025, "C": 0.042})
 
 
-def bench_of(folder: Path, name: str, **firing: object) -> BenchSpec:
-    text = (DATA / "bench.yaml").read_text().replace("HOLES", f"holes.csv{firing.get('more', '')}")
-    (folder / "bench.yaml").write_text(text)
-    (folder / "holes.csv").write_bytes(
-        (DATA / name).read_bytes().replace(b"H14,-7.500,16", b"H15,-7.500,16")
-    )
-    return load_bench(folder / "bench.yaml")
-
-
 def test_ids_reach_messages_and_the_table_of_blocks(tmp_path: Path) -> None:
-    spec = bench_of(tmp_path, "a7_ids.csv")
+    text = (DATA / "bench.yaml").read_text().replace("HOLES", "holes.csv")
+    (tmp_path / "bench.yaml").write_text(text)
+    text = (DATA / "a7_ids.csv").read_text().replace("H14,-7.500,16", "H15,-7.500,16")
+    (tmp_path / "holes.csv").write_text(text)
+    spec = load_bench(tmp_path / "bench.yaml")
     bench = spec.bench.to_bench()
     plan = make_plan(spec, bench, tmp_path)
     assert list(plan.label) == [f"H{k}" for k in range(1, 16)]
     by_block = spec.model_copy(update={"firing": spec.firing.model_copy(update={"blocks": "grid"})})
     grid = make_plan(by_block, bench, tmp_path)
     assert set(grid.label) == set(plan.label)
-    text = (tmp_path / "holes.csv").read_text()
     (tmp_path / "holes.csv").write_text(text.replace("H3,-1.500,9.000", "H3,-1.500,90"))
     with pytest.raises(SpecError, match=r"line 4 \(hole 'H3'\): the hole at x = -1.5 m, y = 90 m"):
         make_plan(spec, bench, tmp_path)
@@ -221,22 +215,6 @@ def test_the_table_of_blocks_names_the_holes() -> None:
     columns = block_columns(case, balls, BENCH, [f"H{k}" for k in range(1, 16)])
     assert columns["hole"] == ["H2", "H7"]
     assert columns["block"].tolist() == [1, 6]
-
-
-def test_a_charge_by_its_mass_is_inside_the_training_data(tmp_path: Path) -> None:
-    """103.17 kg of 800 kg/m3 are 7.3 m of charge, which leave 2.7 m of stemming."""
-    spec = bench_of(tmp_path, "a22_charge_mass.csv")
-    bench = spec.bench.to_bench()
-    by_mass = make_plan(spec, bench, tmp_path)
-    stemming = 10.0 - 103.17 / (800.0 * math.pi / 4.0 * 0.15**2)
-    assert stemming == pytest.approx(2.7, abs=0.01)
-    text = (tmp_path / "holes.csv").read_text()
-    (tmp_path / "holes.csv").write_text(
-        text.replace("charge_mass [kg]", "stemming_length [m]").replace("103.17", repr(stemming))
-    )
-    by_stemming = make_plan(spec, bench, tmp_path)
-    assert by_mass.prediction["in_domain"]
-    assert by_mass.speed == pytest.approx(by_stemming.speed, rel=1e-9)
 
 
 def test_ore_lies_in_the_frame_of_the_bench_too(tmp_path: Path) -> None:

@@ -187,24 +187,7 @@ def test_inconsistent_explosives_are_refused_by_name_and_value(tmp_path: Path) -
     }
     path = written(tmp_path, content)
     spec = load_explosive(path)
-    with pytest.raises(CheckError, match=r"tangency .* \+55\.8 %; allowed: within 2 %") as caught:
+    with pytest.raises(CheckError, match=r"tangency .* \+55\.8 %; allowed: within 2 %"):
         require_consistent(spec)
-    assert caught.value.exit_code == 4
-    assert "inconsistent" in check_explosive(path).title
     assert require_consistent(spec, allow_inconsistent=True)
     assert describe(path)["work"] == {}
-
-
-def test_the_same_emulsion_is_usable_with_its_own_state(tmp_path: Path) -> None:
-    jwl = {"A": "214.4 GPa", "B": "0.182 GPa", "R1": 4.2, "R2": 0.9, "omega": 0.15,
-           "E0": "4.192 GPa"}  # fmt: skip
-    content = TNT | {
-        "density": "1300 kg/m3",
-        "detonation_velocity": "5500 m/s",
-        "cj_pressure": "9.9 GPa",
-        "heat_of_explosion": "3.2 MJ/kg",
-        "jwl": jwl,
-    }
-    outcome = check_explosive(written(tmp_path, content))
-    assert outcome.faults == []
-    assert "warnings" in outcome.title

@@ -219,20 +219,6 @@ def test_a_hostile_table_is_one_line_at_once(tmp_path: Path) -> None:
     assert time.process_time() - start < 10.0
 
 
-@given(st.binary(max_size=300) | st.text(max_size=300).map(str.encode))
-@settings(
-    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
-def test_any_bytes_are_a_table_or_a_fault(tmp_path: Path, data: bytes) -> None:
-    for content in (data, b"x [m],delay [ms]\n" + data):
-        outcome = None
-        try:
-            outcome = len(read(tmp_path, content).line)
-        except SpecError as fault:
-            outcome = str(fault).startswith(str(tmp_path))
-        assert outcome
-
-
 @given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=20), st.sampled_from(";\t,"))
 @settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_numbers_read_back_to_the_same_bits(

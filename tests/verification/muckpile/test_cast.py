@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import inf, sqrt
+from math import inf
 
 import numpy as np
 import pytest
@@ -126,16 +126,3 @@ def test_a_pile_is_steeper_with_more_rolling_friction(cast):
         np.sqrt(np.mean(np.maximum(r.particles.position[:, 0], 0.0) ** 2)) for r in (smooth, result)
     )
     assert far > 1.1 * near
-
-
-def test_two_balls_meet_where_mechanics_says():
-    """Equal balls, one at rest: speeds after are v(1 -+ e)/2."""
-    e = 0.57174
-    balls = particles_at_rest([[0, 0, 0], [0.3, 0, 0]], [0.1, 0.1], velocity=[[2, 0, 0], [0, 0, 0]])
-    case = CastCase(
-        balls, ContactLaw(), floor(-10.0), np.empty(0), np.empty((0, 3)), gravity=0.0,
-        max_time=0.2, min_time=0.2, time_step=2e-5,
-    )  # fmt: skip
-    velocity = run_cast(case).particles.velocity[:, 0]
-    np.testing.assert_allclose(velocity, [1.0 - e, 1.0 + e], rtol=0.01)
-    assert sqrt(np.sum(velocity) ** 2) == pytest.approx(2.0, rel=1e-12)

@@ -9,8 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from castblast.specs.explosive import load_explosive
-
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 LEDGER = (
@@ -53,16 +51,6 @@ def test_paper_mode_ends_before_the_wave_arrives(castblast: Run) -> None:
     assert out["end_time"] == pytest.approx(0.9 * (5.5 - 0.075) / wave_speed, rel=1e-3)
 
 
-def test_settled_pressure_knows_neither_diameter_nor_density(castblast: Run) -> None:
-    """The equilibrium state is a similarity solution in units of hole radius and wave speed."""
-    base = simulate(castblast)
-    other = simulate(castblast, "--set", "hole_diameter=250 mm", "--set", "rock_density=2.0 t/m^3",
-                     "--set", "burden=5 m")  # fmt: skip
-    assert other["equilibrium_pressure"] == pytest.approx(base["equilibrium_pressure"], rel=2e-3)
-    ratio = other["expanded_hole_radius"] / base["expanded_hole_radius"]
-    assert ratio == pytest.approx(250.0 / 150.0, rel=1e-3)
-
-
 def test_case_file_and_options_agree(castblast: Run, tmp_path: Path) -> None:
     path = tmp_path / "case.yaml"
     path.write_text("explosive: heavy_anfo\nparameter_set: field\nset:\n  ucs: 60 MPa\n")
@@ -70,25 +58,6 @@ def test_case_file_and_options_agree(castblast: Run, tmp_path: Path) -> None:
     by_option = simulate(castblast, "--explosive", "heavy_anfo", "--parameter-set", "field",
                          "--set", "ucs=60 MPa")  # fmt: skip
     assert by_file == by_option
-
-
-def test_table_stands_for_the_law_it_was_made_from(castblast: Run, tmp_path: Path) -> None:
-    """ANFO as a table of its own JWL isentrope gives the pressure of the JWL form to 0.2 %."""
-    from castblast.explosive.isentrope import pressure
-
-    explosive = load_explosive("anfo").to_explosive()
-    volumes = np.concatenate([[0.73, 0.8, 0.9, 1.0], np.geomspace(1.1, 900.0, 60)])
-    rows = "\n".join(f"  - [{v:.6g}, {pressure(explosive.isentrope, v):.8g}]" for v in volumes)
-    path = tmp_path / "table.yaml"
-    path.write_text(
-        "name: table\ndensity: 800 kg/m3\ndetonation_velocity: 4806 m/s\n"
-        f"heat_of_explosion: 3.75 MJ/kg\nsource: own table\nisentrope:\n{rows}\n"
-    )
-    rise = "rise_time=36.7 us"
-    table = simulate(castblast, "--explosive", path, "--set", rise)
-    law = simulate(castblast, "--explosive", "anfo", "--set", rise)
-    for key in ("equilibrium_pressure", "burden_velocity"):
-        assert table[key] == pytest.approx(law[key], rel=2e-3)
 
 
 def test_inconsistent_explosive_runs_only_on_request(castblast: Run, tmp_path: Path) -> None:

@@ -145,6 +145,7 @@ def test_faulty_dumps(change: tuple[str, str], line: str, tmp_path: Path) -> Non
         ("2\nProperties=pos:R:3\n0 0 0\n5 0 0\n", "the column 'radius' is missing"),
         ("x,y,z,radius,diameter\n0,0,0,1,1\n", "line 2: the diameter is not twice the radius"),
         ("x,y,z,radius\n0,0,0,20\n", "line 2: radius: 20 m: implausible (20 m); allowed: 0.001"),
+        ("x,y,z,radius\n0,0,0,-0.5\n", "radius: -0.5 m: implausible (-0.5 m); allowed: 0.001 to"),
         ("x,y,z,radius\n7389212,0,0,1\n", "x: 7.38921e+06 m: implausible"),
         ("x,y,z,r\n0,0,0,1\n0,0,1.5,1\n", "worst: balls 0 (line 2) and 1 (line 3) by 50 %"),
     ],

@@ -159,25 +159,6 @@ def test_faulty_balls(tmp_path: Path, arrays: dict[str, object], line: str) -> N
     assert all(text.startswith(str(path)) for text in str(caught.value).splitlines())
 
 
-@pytest.mark.parametrize(
-    ("content", "line"),
-    [(b"", "damaged"), (b"PK\x03\x04cut", "damaged"), (None, "no such file")],
-)
-def test_files_that_are_no_npz(tmp_path: Path, content: bytes | None, line: str) -> None:
-    path = tmp_path / "balls.npz"
-    if content is not None:
-        path.write_bytes(content)
-    with pytest.raises(SpecError, match=line):
-        read_balls(path)
-
-
-def test_a_truncated_npz_is_refused(tmp_path: Path) -> None:
-    path = balls_file(tmp_path, x=GRID, r=RADII)
-    path.write_bytes(path.read_bytes()[:400])
-    with pytest.raises(SpecError, match="damaged"):
-        read_balls(path)
-
-
 def test_folder_of_the_same_name_hides_no_shipped_bench(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -62,11 +62,6 @@ def test_animation_has_a_frame_per_state_and_moves(tmp_path: Path) -> None:
     assert visible(tmp_path) == ["animation.gif"]
 
 
-def test_the_same_states_give_the_same_bytes(tmp_path: Path) -> None:
-    one, two = (film(tmp_path / name, animation="gif")[1][0] for name in "ab")
-    assert one.read_bytes() == two.read_bytes()
-
-
 def test_vtkhdf_alone_leaves_no_series_behind(tmp_path: Path) -> None:
     pytest.importorskip("vtkmodules.vtkIOHDF", reason="VTK is not installed")
     _, files = film(tmp_path, vtkhdf=True)

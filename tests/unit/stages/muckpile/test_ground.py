@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +12,11 @@ import yaml
 from castblast.api.muckpile.document import bench_content
 from castblast.errors import SpecError
 from castblast.muckpile.cast.case import CastCase, CastResult
-from castblast.muckpile.cast.solver import run_cast
 from castblast.muckpile.ground.terrain import heightmap
 from castblast.muckpile.ground.walls import ground_height
 from castblast.specs.bench.bench import load_bench
 from castblast.stages.muckpile import run as muckpile
 from castblast.stages.muckpile.deck import Decks
-from castblast.stages.muckpile.extras import Extras
 from castblast.stages.muckpile.run import run_muckpile
 
 SMALL: dict[str, Any] = {
@@ -81,16 +77,6 @@ def test_rock_comes_to_rest_on_the_ground(
     rise = np.hypot(1.0, 0.5) * radius[on_bank]
     assert (z[on_bank] - ground[on_bank] > 0.9 * rise).all()
     assert (z[~on_bank] > 0.9 * radius[~on_bank]).all()
-
-
-def test_faulty_ground_is_said_before_packing(tmp_path: Path) -> None:
-    with pytest.raises(SpecError, match=r"none.npz: no such file"):
-        run_muckpile(written(tmp_path, ground="none.npz"), tmp_path / "out")
-    height = np.ones((len(Y), len(X)))
-    height[3, 4] = np.nan
-    with pytest.raises(SpecError, match="first in row 3, column 4"):
-        run_muckpile(written(tmp_path, height), tmp_path / "out")
-    assert not (tmp_path / "out").exists()
 
 
 def test_ground_that_cuts_the_packing_is_refused(tmp_path: Path, packings: Path) -> None:
@@ -207,39 +193,3 @@ def test_decks_instead_of_a_run(tmp_path: Path, packings: Path) -> None:
         run_muckpile(bench, tmp_path / "out", decks=decks, **options)
     run_muckpile(bench, tmp_path / "out", decks=decks._replace(lammps=None), **options)
     assert (tmp_path / "liggghts" / "walls1.stl").read_text().count("endfacet") > 256
-
-
-def test_an_interrupted_run_goes_on(
-    tmp_path: Path,
-    packings: Path,
-    ends: list[tuple[CastCase, CastResult]],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Cut off in mid-air and started again, a run ends in the same numbers.
-
-    A film that would begin in mid-air is refused.
-    """
-    monkeypatch.setattr(muckpile, "run_cast", partial(run_cast, restart_interval=0.0))
-    bench, options = written(tmp_path), {"threads": 1, "packings": packings}
-    whole = run_muckpile(bench, tmp_path / "whole", **options).document
-
-    def cut(share: float, line: str) -> None:
-        if line.startswith("t = 0.6"):
-            raise InterruptedError
-
-    with pytest.raises(InterruptedError):
-        run_muckpile(bench, tmp_path / "cut", progress=cut, **options)
-    with pytest.raises(SpecError, match=r"took other frames \(none\) than now asked for"):
-        run_muckpile(bench, tmp_path / "cut", extras=Extras(animation="gif"), **options)
-    restart = tmp_path / "cut" / "restart.npz"
-    assert restart.exists()
-    again: list[str] = []
-    document = run_muckpile(
-        bench, tmp_path / "cut", progress=lambda _, line: again.append(line), **options
-    ).document
-    assert not any("t = 0.1" in line for line in again)
-    assert not restart.exists()
-    timed = ("seconds", "packing_reused")
-    assert json.dumps({k: v for k, v in document.items() if k not in timed}) == json.dumps(
-        {k: v for k, v in whole.items() if k not in timed}
-    )

@@ -142,30 +142,6 @@ def test_balls_from_csv(tmp_path: Path) -> None:
     assert again.velocity.tolist() == balls.velocity.tolist()
 
 
-@pytest.mark.parametrize(
-    ("change", "line"),
-    [
-        (("2.1,0.5", "nan,0.5"), "line 3: y: nan: a number is needed"),
-        (("2.1,0.5", "1.8,0.5"), "balls 0 (line 2) and 1 (line 3) by 40 %"),
-        (("radius", "rho"), "column 'rho': unknown column"),
-        (
-            ("0.5,0.5,1", "0.5,-0.5,1"),
-            "line 3: radius: -0.5 m: implausible (-0.5 m); allowed: 0.001 to 18 m",
-        ),
-        (("vy,", "v_y,"), "unknown column, did you mean 'vy'?"),
-        (("1,2,3", "1,2,"), "line 3: vz: empty: a number is needed"),
-        (("2.1,0.5", "2.1 0.5"), "line 3: 6 cells for 7 heads"),
-    ],
-)
-def test_faulty_balls_in_csv(tmp_path: Path, change: tuple[str, str], line: str) -> None:
-    path = tmp_path / "balls.csv"
-    path.write_text(BALLS.replace(*change))
-    with pytest.raises(SpecError) as caught:
-        read_balls(path)
-    assert line in str(caught.value)
-    assert str(caught.value).startswith(str(path))
-
-
 def test_a_file_of_moving_balls_is_run(tmp_path: Path) -> None:
     """Two free balls, one of them moving: it keeps its level velocity, no block fires it."""
     (tmp_path / "balls.csv").write_text(BALLS.replace("0.5,0.5,1,2,3", "9,0.5,1,0,0"))
