@@ -92,4 +92,4 @@ def fake_generate(recipe: Path, path: Path, *, simulator=None, **options) -> Gen
     """Build the dataset of a recipe file without physics."""
     source = load_recipe(recipe)
     simulator = simulator or fake_simulator(recipe)
-    return generated(build_dataset(source, load_explosives(source), simulator, path, **options))
+    return generated(build_dataset(source, path, simulator, **options))

@@ -128,13 +128,13 @@ def generate(
     (60, ['ok'])
     """
     require("simulate", "data", purpose="castblast.generate")
-    from castblast.dataset.building.produce import build_recipe, output_path
+    from castblast.dataset.building.produce import build_dataset, output_path
     from castblast.stopping import sigterm_as_interrupt
 
     source = resized(load_recipe(recipe, size), seed)
     with TemporaryDirectory(prefix="castblast-") as scratch, sigterm_as_interrupt():
         path = output_path(source, scratch if out is None else out)
-        build_recipe(
+        build_dataset(
             source,
             path,
             workers=workers,

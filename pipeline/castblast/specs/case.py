@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -75,9 +75,14 @@ def split_assignments(assignments: Iterable[str]) -> dict[str, str]:
 
 
 def parse_values(
-    values: Mapping[str, Any], where: str, names: Iterable[str] = INPUT_NAMES
+    values: Mapping[str, Any],
+    where: str,
+    names: Iterable[str] = INPUT_NAMES,
+    parse: Callable[[str, Any, str], float] = parse_variable,
 ) -> dict[str, float]:
     """Turn quantities with units into SI floats, reporting all faults at once.
+
+    `parse` turns one value of a variable into SI; its last argument begins the line of a fault.
 
     Raises
     ------
@@ -92,7 +97,7 @@ def parse_values(
             faults.append(unknown_input(name, value, where, allowed))
             continue
         try:
-            parsed[name] = parse_variable(name, value, f"{where}: {name}")
+            parsed[name] = parse(name, value, f"{where}: {name}")
         except SpecError as error:
             faults.append(error)
     require_none(faults)

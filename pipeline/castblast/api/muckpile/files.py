@@ -19,6 +19,7 @@ from castblast.api.muckpile.tables import (
     profile_columns,
 )
 from castblast.disk.files import write_csv, write_json, write_with
+from castblast.muckpile.balls.particles import Particles
 from castblast.muckpile.bench.geometry import Bench
 from castblast.muckpile.cast.solver import CastCase, CastResult
 from castblast.muckpile.results.profile import HeightField, mean_profile
@@ -54,6 +55,21 @@ def write_results(
     surface = pile_surface(before, after, bench, case.walls)
     sections = pile_sections(surface, bench)
     ground = ground_profile(surface, bench, case.walls)
+    timeless = {k: v for k, v in document.items() if k not in ("seconds", "packing_reused")}
+    files = [
+        *write_state(folder, before, after, surface, ore),
+        write_csv(folder / "profile.csv", profile_columns(surface, sections, ground)),
+        write_csv(folder / "history.csv", history_columns(result.history)),
+        write_csv(folder / "blocks.csv", block_columns(case, after, bench, label)),
+        write_json(folder / "metrics.json", timeless),
+    ]
+    return files + _draw(folder, bench, surface, case, result, ore)
+
+
+def write_state(
+    folder: Path, before: Particles, after: Particles, surface: HeightField, ore: OreRun | None
+) -> list[Path]:
+    """Write balls and surface after the cast as arrays."""
     stored: dict[str, Any] = {
         "x": after.position,
         "r": after.radius,
@@ -64,16 +80,10 @@ def write_results(
     }
     if ore:
         stored["polygon"] = ore.moved.polygon
-    timeless = {k: v for k, v in document.items() if k not in ("seconds", "packing_reused")}
-    files = [
+    return [
         write_with(folder / "final_state.npz", lambda name: np.savez_compressed(name, **stored)),
         write_with(folder / "surface.npz", lambda name: np.savez(name, **surface._asdict())),
-        write_csv(folder / "profile.csv", profile_columns(surface, sections, ground)),
-        write_csv(folder / "history.csv", history_columns(result.history)),
-        write_csv(folder / "blocks.csv", block_columns(case, after, bench, label)),
-        write_json(folder / "metrics.json", timeless),
     ]
-    return files + _draw(folder, bench, surface, case, result, ore)
 
 
 def _draw(

@@ -15,9 +15,8 @@ import numpy as np
 
 from castblast.bands import BAND_TITLE, Ends, prediction_band, show_band, show_value
 from castblast.design.rule import OPTIONAL
-from castblast.design.variables import INPUT_NAMES, VARIABLES
-from castblast.errors import SpecError
-from castblast.specs.case import require_none, unknown_input
+from castblast.design.variables import VARIABLES
+from castblast.specs.case import parse_values
 from castblast.specs.quantity import check_variable, parse_variable
 
 
@@ -97,17 +96,7 @@ def si_values(values: Mapping[str, object], where: str) -> dict[str, float]:
     SpecError
         Unknown names, units, values out of range; a line each.
     """
-    found, faults = {}, []
-    for name, value in values.items():
-        if name not in INPUT_NAMES:
-            faults.append(unknown_input(name, value, where))
-            continue
-        try:
-            found[name] = si_value(name, value, f"{where}: {name}")
-        except SpecError as fault:
-            faults.append(fault)
-    require_none(faults)
-    return found
+    return parse_values(values, where, parse=si_value)
 
 
 def si_value(name: str, value: object, where: str) -> float:

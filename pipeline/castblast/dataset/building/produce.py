@@ -17,7 +17,7 @@ from castblast.dataset.building.workplace import (
 )
 from castblast.dataset.file.card import write_card
 from castblast.dataset.file.failures import require_success, summary
-from castblast.dataset.file.provenance import ExplosiveSource, load_explosives, made_from, rows_hash
+from castblast.dataset.file.provenance import load_explosives, made_from, rows_hash
 from castblast.dataset.file.store import reading_dataset
 from castblast.dataset.rows.design import make_design
 from castblast.dataset.rows.simulation import Simulator, blast_simulator
@@ -34,51 +34,25 @@ class Built(NamedTuple):
     lines: list[str]
 
 
-def build_recipe(
-    source: RecipeSource,
-    path: Path,
-    *,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    restart: bool = False,
-    progress: ProgressCallback = silent,
-) -> Built:
-    """Build the dataset of a recipe with the real physics; see `build_dataset`."""
-    explosives = load_explosives(source)
-    products = tuple(entry.spec.to_explosive() for entry in explosives)
-    return build_dataset(
-        source,
-        explosives,
-        blast_simulator(source.recipe, products),
-        path,
-        workers=workers,
-        scheduler=scheduler,
-        restart=restart,
-        progress=progress,
-    )
-
-
 def build_dataset(
     source: RecipeSource,
-    explosives: tuple[ExplosiveSource, ...],
-    simulator: Simulator,
     path: Path,
+    simulator: Simulator | None = None,
     *,
     workers: int | None = None,
     scheduler: str | None = None,
     restart: bool = False,
     progress: ProgressCallback = silent,
 ) -> Built:
-    """Build a dataset with a given simulator; resumes an earlier run that was stopped.
+    """Build the dataset of a recipe; resumes an earlier run that was stopped.
 
     Parameters
     ----------
     source : RecipeSource
-    explosives : tuple of ExplosiveSource
-        In the order of the recipe.
-    simulator : Simulator
     path : path
         The netCDF file.
+    simulator : Simulator, optional
+        Default: the physics.
     workers : int, optional
         Threads; default: one per core that may be used.
     scheduler : str, optional
@@ -97,7 +71,9 @@ def build_dataset(
     SimulationError
         More failed samples than the recipe allows; the shards are kept.
     """
-    recipe = source.recipe
+    recipe, explosives = source.recipe, load_explosives(source)
+    if simulator is None:
+        simulator = blast_simulator(recipe, tuple(one.spec.to_explosive() for one in explosives))
     origin = made_from(recipe, explosives)
     with sole_builder(path):
         if not restart and is_finished(path, origin):

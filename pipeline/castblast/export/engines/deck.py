@@ -175,7 +175,33 @@ def atom_lines(
         yield f"{k + 1} " + " ".join(f"{value:.17g}" for value in state[ball])
 
 
-def firing_lines(
+def opening_lines(case: CastCase, step: float) -> Iterator[str]:
+    """Neighbour lists and time step."""
+    yield f"neighbor {SKIN_RATIO * 2.0 * np.mean(case.particles.radius):.6g} bin"
+    yield "neigh_modify delay 0 every 1 check yes"
+    yield f"timestep {step:.12g}"
+
+
+def run_lines(
+    case: CastCase,
+    firings: Firings,
+    step: float,
+    steps: int,
+    members: Callable[[int], str],
+    columns: str,
+) -> Iterator[str]:
+    """Motion, samples, frames of these `columns`, firings and end; arguments as of its parts."""
+    yield "fix motion free nve/sphere"
+    yield "compute ke all ke\nthermo_style custom step time atoms c_ke"
+    yield f"thermo {_sample_steps(case, step)}\nthermo_modify norm no lost warn"
+    if case.snapshot_interval > 0.0:
+        every = max(1, round(case.snapshot_interval / step))
+        yield f"dump frames all custom {every} frames.dump {columns}"
+    yield from _firing_lines(case, firings, step, members)
+    yield from _ending_lines(case, firings, step, steps)
+
+
+def _firing_lines(
     case: CastCase, firings: Firings, step: float, members: Callable[[int], str]
 ) -> Iterator[str]:
     """Lines that run up to each firing and fire it; `members` gives its balls as ``group`` does.
@@ -199,17 +225,17 @@ def firing_lines(
             yield f"group free {members(k + 1)}"
 
 
-def sample_steps(case: CastCase, step: float) -> int:
+def _sample_steps(case: CastCase, step: float) -> int:
     """Steps of a sample."""
     return max(1, round(case.sample_interval / step))
 
 
-def ending_lines(case: CastCase, firings: Firings, step: float, steps: int) -> Iterator[str]:
+def _ending_lines(case: CastCase, firings: Firings, step: float, steps: int) -> Iterator[str]:
     """Run `steps` steps if they are not 0; otherwise until the translational energy stays low."""
     if steps > 0:
         yield f"run {steps} {ON}"
         return
-    piece = sample_steps(case, step)
+    piece = _sample_steps(case, step)
     start = round(float(firings.time[-1]) / step) if len(firings.time) else 0
     longest = max(start + 1, int(case.max_time / step))
     earliest = ceil(case.min_time / step)

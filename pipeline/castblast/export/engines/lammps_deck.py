@@ -22,16 +22,14 @@ import numpy as np
 
 from castblast.disk.files import write_text
 from castblast.export.engines.deck import (
-    SKIN_RATIO,
     Firings,
     RadiusTypes,
     atom_lines,
     deck_types,
-    ending_lines,
-    firing_lines,
+    opening_lines,
     pair_stiffness,
     plan_firings,
-    sample_steps,
+    run_lines,
     time_step,
 )
 from castblast.export.engines.lammps_walls import WallRegion, wall_regions
@@ -123,9 +121,8 @@ def _input_lines(case: CastCase, types: RadiusTypes, firings: Firings, steps: in
     yield "# The molecule number of a ball is its firing; 0: free from the start"
     yield "fix firing all property/atom mol"
     yield "read_data balls.data fix firing NULL Firing"
-    yield f"neighbor {SKIN_RATIO * 2.0 * np.mean(case.particles.radius):.6g} bin"
-    yield "neigh_modify delay 0 every 1 check yes"
-    yield f"timestep {step:.12g}\n\n# Contact law: one stiffness per pair of types\n"
+    yield from opening_lines(case, step)
+    yield "\n# Contact law: one stiffness per pair of types\n"
     yield "pair_style granular"
     for i, j in combinations_with_replacement(range(len(radius)), 2):
         kn = float(pair_stiffness(radius[[i]], radius[[j]], law.effective_modulus)[0])
@@ -138,14 +135,8 @@ def _input_lines(case: CastCase, types: RadiusTypes, firings: Firings, steps: in
         yield from _wall_lines(wall, radius, law)
     yield f"\nfix gravity all gravity {case.gravity:.17g} vector 0 0 -1"
     yield "group free molecule 0" if case.hold_unfired else "group free union all"
-    yield "fix motion free nve/sphere"
-    yield "compute ke all ke\nthermo_style custom step time atoms c_ke"
-    yield f"thermo {sample_steps(case, step)}\nthermo_modify norm no lost warn"
-    if case.snapshot_interval > 0.0:
-        every = max(1, round(case.snapshot_interval / step))
-        yield f"dump frames all custom {every} frames.dump id type diameter x y z vx vy vz mol"
-    yield from firing_lines(case, firings, step, lambda number: f"molecule {number}")
-    yield from ending_lines(case, firings, step, steps)
+    columns = "id type diameter x y z vx vy vz mol"
+    yield from run_lines(case, firings, step, steps, lambda number: f"molecule {number}", columns)
     yield (
         "write_dump all custom final.dump id type diameter x y z vx vy vz "
         "omegax omegay omegaz mol modify sort id"

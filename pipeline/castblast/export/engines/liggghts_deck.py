@@ -21,16 +21,14 @@ import numpy as np
 
 from castblast.disk.files import write_csv, write_text
 from castblast.export.engines.deck import (
-    SKIN_RATIO,
     Firings,
     RadiusTypes,
     atom_lines,
     deck_types,
-    ending_lines,
-    firing_lines,
+    opening_lines,
     pair_stiffness,
     plan_firings,
-    sample_steps,
+    run_lines,
     time_step,
 )
 from castblast.export.engines.liggghts_walls import WallKind, stl_text, wall_kinds
@@ -116,9 +114,7 @@ def _input_lines(
     yield "units si\natom_style sphere\natom_modify map array\nboundary m m m\nnewton off"
     yield "communicate single vel yes\nprocessors * * 1"
     yield "read_data balls.data"
-    yield f"neighbor {SKIN_RATIO * 2.0 * np.mean(case.particles.radius):.6g} bin"
-    yield "neigh_modify delay 0 every 1 check yes"
-    yield f"timestep {step:.12g}"
+    yield from opening_lines(case, step)
     yield from _law_lines(case.law, types.radius, kinds)
     yield from _wall_lines(case.law, len(types.radius), kinds)
     yield f"\nfix gravity all gravity {case.gravity:.17g} vector 0 0 -1"
@@ -133,14 +129,8 @@ def _input_lines(
         yield f"group free {members(0)}"
     else:
         yield "group free subtract all all"
-    yield "fix motion free nve/sphere"
-    yield "compute ke all ke\nthermo_style custom step time atoms c_ke"
-    yield f"thermo {sample_steps(case, step)}\nthermo_modify norm no lost warn"
-    if case.snapshot_interval > 0.0:
-        every = max(1, round(case.snapshot_interval / step))
-        yield f"dump frames all custom {every} frames.dump id type radius x y z vx vy vz"
-    yield from firing_lines(case, firings, step, members)
-    yield from ending_lines(case, firings, step, steps)
+    columns = "id type radius x y z vx vy vz"
+    yield from run_lines(case, firings, step, steps, members, columns)
     yield (
         "dump final all custom 1 final.dump id type radius x y z vx vy vz omegax omegay omegaz\n"
         "dump_modify final sort id\nrun 0"

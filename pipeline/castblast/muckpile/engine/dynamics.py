@@ -90,27 +90,6 @@ def _drift(
 
 
 @lean_kernel
-def _do_pairs(
-    balls: Balls,
-    pairs: Contacts,
-    first: int,
-    last: int,
-    law: Constants,
-    step: float,
-    work: FloatArray,
-    w: int,
-    blocks: RealArray,
-    names: Int32Array,
-    b: int,
-) -> None:
-    """Pair forces of the balls first .. last - 1; `work` is booked in row `w`."""
-    pair_forces(
-        balls.place, balls.motion, balls.force, pairs.start, pairs.partner,
-        pairs.memory, pairs.touching, pairs.dash, first, last, law, step, work, w, blocks, names, b,
-    )  # fmt: skip
-
-
-@lean_kernel
 def _do_balls(
     balls: Balls,
     touches: Contacts,
@@ -183,7 +162,7 @@ def _sweep(
     for s in range(first, last):
         here, there = slab[s], slab[s + 1]
         if pending >= 0.0 and (ends or s < last - 1):
-            _do_pairs(balls, pairs, here, there, law, pending, work, s, blocks, names, b)
+            pair_forces(balls, pairs, here, there, law, pending, work, s, blocks, names, b)
         off = _do_balls(
             balls, touches, walls, here, there, law, gravity, pending, step, elapsed, work, s
         )
@@ -260,7 +239,7 @@ def advance(
             if chunks > 1:
                 for c in prange(chunks - 1):
                     s = chunk[c + 1] - 1
-                    _do_pairs(
+                    pair_forces(
                         balls, pairs, slab[s], slab[s + 1], law, pending, work, s, blocks, names, c
                     )
             ended += 1
@@ -296,7 +275,7 @@ def present_forces(
     balls.force[:, 0:6] = 0.0
     for c in prange(chunks - 1):
         s = chunk[c + 1] - 1
-        _do_pairs(balls, pairs, slab[s], slab[s + 1], law, 0.0, work, s, blocks, names, c)
+        pair_forces(balls, pairs, slab[s], slab[s + 1], law, 0.0, work, s, blocks, names, c)
     for c in prange(chunks):
         _sweep(
             balls, pairs, touches, walls, slab, chunk[c], chunk[c + 1], c == chunks - 1,

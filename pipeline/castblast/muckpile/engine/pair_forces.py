@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from castblast.kernel import fused_kernel, inline_kernel, lean_kernel
 from castblast.muckpile.balls.contact import Constants, ball_stiffness, close_contact
+from castblast.muckpile.balls.state import Balls, Contacts
 from castblast.muckpile.engine.contact_step import book_opening, book_step, step_contact
 from castblast.types import FloatArray, Int32Array, RealArray
 
@@ -246,14 +247,8 @@ def _finish_block(
 
 @lean_kernel
 def pair_forces(
-    place: FloatArray,
-    motion: RealArray,
-    force: RealArray,
-    start: Int32Array,
-    partner: Int32Array,
-    memory: RealArray,
-    touching: NDArray[np.uint8],
-    dash: RealArray,
+    balls: Balls,
+    pairs: Contacts,
     first: int,
     last: int,
     law: Constants,
@@ -268,10 +263,8 @@ def pair_forces(
 
     Parameters
     ----------
-    place, motion, force : arrays
-        Of `castblast.muckpile.balls.state.Balls`.
-    start, partner, memory, touching, dash : arrays
-        Of `castblast.muckpile.balls.state.Contacts`.
+    balls : Balls
+    pairs : Contacts
     first, last : int
     law : Constants
     step : float [s]
@@ -280,6 +273,9 @@ def pair_forces(
     blocks, names : array (m * BLOCK_NUMBERS,), (m * BLOCK_NAMES,)
         Room to work in; only block `b` is used.
     """
+    place, motion, force = balls.place, balls.motion, balls.force
+    start, partner, memory = pairs.start, pairs.partner, pairs.memory
+    touching, dash = pairs.touching, pairs.dash
     base, name, count = b * BLOCK_NUMBERS, b * BLOCK_NAMES, 0
     blocks[base + _STEP] = step
     for i in range(first, last):

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from castblast.dataset.building.produce import Built, build_recipe, output_path
+from castblast.dataset.building.produce import Built, build_dataset, output_path
 from castblast.dataset.file.store import reading_dataset
 from castblast.disk.plain import as_plain
 from castblast.progress import ProgressCallback, silent
@@ -65,7 +65,7 @@ def generate(
         More failed samples than the recipe allows; the shards are kept.
     """
     source = load_recipe(recipe, size)
-    built = build_recipe(
+    built = build_dataset(
         source,
         output_path(source, out),
         workers=workers,

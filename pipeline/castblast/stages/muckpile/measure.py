@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from castblast.api.muckpile.document import DOCUMENT_UNITS, HEADER, metric_rows
-from castblast.api.muckpile.files import OPTIONAL_FILES
+from castblast.api.muckpile.files import OPTIONAL_FILES, write_state
 from castblast.api.muckpile.ore import OreRun, describe_ore
 from castblast.api.muckpile.tables import (
     block_columns,
@@ -20,7 +20,7 @@ from castblast.api.muckpile.tables import (
     profile_columns,
 )
 from castblast.api.muckpile.velocity import describe_velocity, velocity_remarks
-from castblast.disk.files import staged, tried, write_csv, write_json, write_with
+from castblast.disk.files import staged, tried, write_csv, write_json
 from castblast.disk.locks import LOCK_NAME, only_writer
 from castblast.disk.plain import as_plain
 from castblast.disk.resources import find_spec
@@ -224,21 +224,10 @@ def _document(found: _Measured, files: Mapping[str, Path]) -> dict[str, Any]:
 def _write(folder: Path, found: _Measured, document: Mapping[str, Any]) -> Sequence[Path]:
     """Write state, tables, metrics and pictures."""
     before, after = found.case.particles, found.after
-    stored: dict[str, Any] = {
-        "x": after.position,
-        "r": after.radius,
-        "v": after.velocity,
-        "w": after.angular_velocity,
-        "block": after.block,
-        "x_before": before.position,
-    }
-    if found.ore:
-        stored["polygon"] = found.ore.moved.polygon
     surface = found.surface
     profiles = profile_columns(surface, found.sections, found.ground)
     files = [
-        write_with(folder / "final_state.npz", lambda name: np.savez_compressed(name, **stored)),
-        write_with(folder / "surface.npz", lambda name: np.savez(name, **surface._asdict())),
+        *write_state(folder, before, after, surface, found.ore),
         write_csv(folder / "profile.csv", profiles),
         write_json(folder / "metrics.json", document),
     ]
