@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.figure import Figure
+from matplotlib.quiver import Quiver
 
 import castblast as cb
 from castblast.disk.reading import read_json
 from castblast.errors import SpecError
+from castblast.report.piles.bench_plan import bench_figure
 from castblast.stages.muckpile.run import run_muckpile
 
 SMALL = {
@@ -57,6 +59,31 @@ def test_a_bench_draws_itself(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         assert len(bench.blocks) == len(bench.plan.delay)
     assert not list(tmp_path.iterdir())
     monkeypatch.undo()
+
+
+def test_arrows_of_a_plan_are_whole_and_end_before_the_next_row() -> None:
+    bench = cb.load_bench("row_by_row")
+    axes = bench.plot().axes[0]
+    (arrows,) = (part for part in axes.collections if isinstance(part, Quiver))
+    tips = arrows.get_offsets()[:, 1] + np.asarray(arrows.V)
+    assert len(tips) == len(bench.blocks)
+    assert axes.get_ylim()[0] < tips.min()
+    assert tips.max() < axes.get_ylim()[1]
+    rows = np.unique(bench.blocks["x"].round(6))
+    lengths = np.asarray(arrows.V)
+    assert 0.3 < lengths.min() / np.diff(rows).min() < 1.0
+
+
+@pytest.mark.parametrize("is_fired", [True, False])
+def test_a_plan_names_what_is_not_fired(is_fired: bool) -> None:
+    bench = cb.load_bench("row_by_row")
+    geometry, plan = bench.spec.bench.to_bench(), bench.plan
+    delay = np.array(plan.delay)
+    delay[0] = delay[0] if is_fired else np.inf
+    place = bench.blocks[["x", "y"]].to_numpy()
+    (legend,) = bench_figure("plan", geometry, place, delay, plan.velocity).legends
+    words = [text.get_text() for text in legend.get_texts()]
+    assert words == ["toe of the face", *([] if is_fired else ["not fired"])]
 
 
 def test_a_cast_is_that_of_the_command_line(
