@@ -123,8 +123,8 @@ def test_axes_must_be_orthogonal():
 def test_walls_around_a_bench():
     """Rear face and ground on top meet in one edge that is touched once."""
     bench = Bench(length=10.0, width=6.0, height=5.0)
-    walls = bench_walls(bench, ends="wall", slope_distance=4.0)
-    assert len(walls.origin) == 3 + 6 + 1
+    walls = bench_walls(bench, ends="wall")
+    assert len(walls.origin) == 3 + 6
     at_rear = [distance(walls, (-5.95, 5.0, 2.0), k)[0] for k in range(len(walls.origin))]
     assert np.flatnonzero(np.array(at_rear) < 0.1).tolist() == [1]
     over_edge = [distance(walls, (-5.97, 5.0, 5.03), k)[0] for k in range(len(walls.origin))]

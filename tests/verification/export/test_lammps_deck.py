@@ -24,7 +24,7 @@ from castblast.muckpile.bench.surroundings import bench_walls
 from castblast.muckpile.cast.case import CastCase
 from castblast.muckpile.cast.solver import run_cast
 from castblast.muckpile.ground.terrain import heightmap
-from castblast.muckpile.ground.walls import join, rectangle
+from castblast.muckpile.ground.walls import join, rectangle, slope
 
 LAW = ContactLaw(cap_on_total=True, dashpot_mode=1)
 
@@ -109,7 +109,7 @@ def test_blocks_of_one_time_and_velocity_go_together_and_others_are_held():
 def test_rock_around_a_bench_becomes_boxes(tmp_path):
     """Rear and both ends: a box each instead of two or three rectangles; the slope is a plane."""
     bench = Bench(length=1.25, width=1.6, height=2.0)
-    walls = bench_walls(bench, ends="wall", slope_distance=3.0)
+    walls = join(bench_walls(bench, ends="wall"), slope(3.0, np.pi / 6.0))
     _, script = write_lammps_deck(tmp_path, small_case(walls=walls))
     regions = re.findall(r"^region \S+ (\S+) (.*)$", script.read_text(), re.MULTILINE)
     assert [style for style, _ in regions] == ["plane", "plane", "block", "block", "block"]

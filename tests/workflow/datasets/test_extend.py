@@ -15,7 +15,7 @@ from castblast.dataset.file.store import open_dataset
 from castblast.errors import CheckError, SimulationError, SpecError
 from castblast.stages.datasets.dataset import describe_dataset
 from castblast.stages.datasets.diff import diff_datasets
-from castblast.stages.datasets.extend import produce_extension
+from castblast.stages.datasets.extend import extend
 
 
 @pytest.fixture(scope="module")
@@ -28,9 +28,8 @@ def made(tmp_path_factory):
 
 
 def extend_fake(path, add, out, *, simulator=None, **options):
-    existing = read_existing(path)
     simulator = simulator or fake_simulator(path.with_name("r.yaml"), fail_above=100e6)
-    return produce_extension(existing, simulator, add, out, **options)
+    return extend(path, add, out, simulator=simulator, **options)
 
 
 @pytest.fixture(scope="module")
@@ -104,8 +103,8 @@ def test_goes_on_after_a_breakdown(made, extended, tmp_path):
 
 def test_an_extension_can_be_extended(made, extended, tmp_path):
     path = tmp_path / "data.nc"
-    existing = read_existing(extended)
-    produce_extension(existing, fake_simulator(made.with_name("r.yaml"), fail_above=100e6), 5, path)
+    fake = fake_simulator(made.with_name("r.yaml"), fail_above=100e6)
+    extend(extended, 5, path, simulator=fake)
     attributes = open_dataset(path).attrs
     assert attributes["id"] == "small/1.4.0"
     assert [entry["size"] for entry in json.loads(attributes["extends"])] == [60, 85]

@@ -12,7 +12,7 @@ from castblast.dataset.file.check import check
 from castblast.dataset.file.store import open_dataset
 from castblast.dataset.rows.design_file import read_design_file, write_design_file
 from castblast.errors import SpecError
-from castblast.stages.datasets.extend import produce_extension
+from castblast.stages.datasets import extend as extending
 from castblast.stages.datasets.infill import infill, shares_of
 
 VARIABLES = {
@@ -49,10 +49,8 @@ def chosen(made) -> Path:
 
 
 def extend(made: Path, design: Path, out: Path, **options):
-    existing = read_existing(made)
-    return produce_extension(
-        existing, fake_simulator(made.with_name("r.yaml")), design, out, **options
-    )
+    simulator = fake_simulator(made.with_name("r.yaml"))
+    return extending.extend(made, design, out, simulator=simulator, **options)
 
 
 def test_infill_writes_rows_of_the_domain(made, chosen) -> None:
@@ -105,9 +103,8 @@ def test_another_design_is_another_dataset_and_can_be_extended(made, chosen, tmp
     less.write_text("".join([lines[0], *lines[2:], lines[1]]))
     with pytest.raises(SpecError, match="extends"):
         extend(made, less, out)
-    existing = read_existing(out)
     more = tmp_path / "more.nc"
-    produce_extension(existing, fake_simulator(made.with_name("r.yaml")), 15, more)
+    extending.extend(out, 15, more, simulator=fake_simulator(made.with_name("r.yaml")))
     parents = json.loads(open_dataset(more).attrs["extends"])
     assert ["design_sha256" in parent for parent in parents] == [True, False]
     fresh = open_dataset(more).isel(sample=slice(260, 275))["split"].to_numpy()

@@ -1,21 +1,14 @@
-"""Floor, intact rock and slopes around a bench, as walls."""
+"""Floor and intact rock around a bench, as walls."""
 
 from __future__ import annotations
 
-from math import inf, pi
+from math import inf
 
 from castblast.muckpile.bench.geometry import Bench
-from castblast.muckpile.ground.walls import Walls, floor, join, plane, rectangle, slope
+from castblast.muckpile.ground.walls import Walls, floor, join, plane, rectangle
 
 
-def bench_walls(
-    bench: Bench,
-    *,
-    rear: bool = True,
-    ends: str = "open",
-    slope_distance: float | None = None,
-    slope_angle: float = pi / 6.0,
-) -> Walls:
+def bench_walls(bench: Bench, *, rear: bool = True, ends: str = "open") -> Walls:
     """Floor and what stands around a bench.
 
     Parameters
@@ -26,9 +19,6 @@ def bench_walls(
     ends : {"open", "wall", "mirror"}
         At both ends of the bench: nothing; intact rock beside the bench, as high as it;
         frictionless planes of any extent, i.e. the bench is a slice of a long one.
-    slope_distance : float, optional [m]
-        From the face to the toe of a slope that faces the bench; None: no slope.
-    slope_angle : float [rad]
 
     Raises
     ------
@@ -50,8 +40,6 @@ def bench_walls(
     elif ends != "open":
         message = f"ends = {ends!r}: must be 'open', 'wall' or 'mirror'"
         raise ValueError(message)
-    if slope_distance is not None:
-        parts.append(slope(slope_distance, slope_angle))
     return join(*parts)
 
 

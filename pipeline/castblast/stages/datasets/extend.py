@@ -67,6 +67,7 @@ def extend(
     add: int | str | Path,
     out: str | Path | None = None,
     *,
+    simulator: Simulator | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
     restart: bool = False,
@@ -83,6 +84,8 @@ def extend(
         training rows. Their ids follow the largest so far.
     out : Path, optional
         The netCDF file, or a folder for it; default: ``data/NAME/NEW_VERSION/data.nc``.
+    simulator : Simulator, optional
+        Default: the physics.
     workers, scheduler, restart
         As in `stages.datasets.generate.generate`.
 
@@ -99,36 +102,12 @@ def extend(
         More failed samples than the recipe allows; the shards are kept.
     """
     existing = read_existing(Path(dataset), lambda _, line: progress(0.0, line))
-    simulator = blast_simulator(
-        existing.source.recipe, tuple(entry.spec.to_explosive() for entry in existing.explosives)
-    )
-    return produce_extension(
-        existing,
-        simulator,
-        add,
-        out,
-        workers=workers,
-        scheduler=scheduler,
-        restart=restart,
-        progress=progress,
-    )
-
-
-def produce_extension(
-    existing: Existing,
-    simulator: Simulator,
-    add: int | str | Path,
-    out: str | Path | None = None,
-    *,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    restart: bool = False,
-    progress: ProgressCallback = silent,
-) -> GenerateOutcome:
-    """Extend a dataset with a given simulator; see `extend`."""
     new_rows = _new_rows(existing, add)
     source, parents = existing.extended_source(new_rows.count), new_rows.parents
     recipe = source.recipe
+    if simulator is None:
+        products = tuple(entry.spec.to_explosive() for entry in existing.explosives)
+        simulator = blast_simulator(recipe, products)
     path = output_path(source, out)
     if path.resolve() == existing.path.resolve():
         message = f"{path}: is the dataset to be extended; choose another place with --out"
