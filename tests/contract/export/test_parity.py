@@ -10,13 +10,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from toy_network import toy_network
 
 from castblast.bands import BASIS, PRIORS
-from castblast.errors import CheckError, SpecError
+from castblast.errors import CheckError
 from castblast.export.onnx.file import OPSET, run_onnx_rows, to_onnx
 from castblast.export.parity import TOLERANCE, check_parity
 from castblast.export.targets import TARGETS
-from castblast.network import Network, evaluate_rows, explosive_index
+from castblast.network import Network, evaluate_rows, explosive_index, member_spread
 from castblast.network.json_file import to_json
 from castblast.prediction.answer import load_network
 from castblast.specs.models.model import PAPER_FEATURES, PAPER_TARGETS, MlpSpec, RidgeSpec
@@ -142,6 +143,23 @@ def test_onnx_is_float64_old_enough_and_takes_any_batch(network: Network) -> Non
     assert metadata["prediction_basis"] == BASIS
 
 
+def test_spread_in_onnx() -> None:
+    """Relative standard deviation over network and members, as NumPy computes it."""
+    onnxruntime = pytest.importorskip("onnxruntime")
+    network = toy_network()
+    rows, index = network.golden.inputs, np.arange(200) % 2
+    session = onnxruntime.InferenceSession(to_onnx(network), providers=["CPUExecutionProvider"])
+    names = [f"{name}_spread" for name in network.output_names]
+    found = np.stack(session.run(names, {"numeric": rows, "explosive": index}), axis=1)
+    np.testing.assert_allclose(found, member_spread(network, rows, index), rtol=1e-11)
+    answers = [
+        evaluate_rows(replace(network, layers=layers), rows, index)
+        for layers in (network.layers, *network.members)
+    ]
+    expected = np.std(answers, axis=0, ddof=1) / np.abs(answers[0])
+    np.testing.assert_allclose(found, expected, rtol=1e-11)
+
+
 def test_an_export_that_disagrees_is_not_written(network: Network, tmp_path: Path) -> None:
     """Golden answers off by 1e-9: exit code 4, deviation named, no file left."""
     golden = replace(network.golden, outputs=network.golden.outputs * (1.0 + 1e-9))
@@ -151,18 +169,6 @@ def test_an_export_that_disagrees_is_not_written(network: Network, tmp_path: Pat
         export(source, tmp_path / "out")
     assert fault.value.exit_code == 4
     assert not (tmp_path / "out").exists()
-
-
-def test_unknown_export_targets_are_named(network: Network, tmp_path: Path) -> None:
-    source = tmp_path / "network.json"
-    source.write_text(to_json(network))
-    with pytest.raises(SpecError, match=r"'onx': not known, did you mean 'onnx'\?"):
-        export(source, targets=["json", "onx"])
-    with pytest.raises(SpecError, match="no such file or folder"):
-        export(tmp_path / "none")
-    (tmp_path / "empty").mkdir()
-    with pytest.raises(SpecError, match="holds no network"):
-        export(tmp_path / "empty")
 
 
 def test_reference_evaluator_agrees_with_onnxruntime(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,12 +1,16 @@
 """A network.json that cannot be used is refused in one line that names the file and the entry."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
+from toy_network import toy_network
 
 from castblast.errors import SpecError
-from castblast.network.json_file import read_network, to_json
+from castblast.network import predict_rows
+from castblast.network.json_file import from_json, read_network, to_document, to_json
 from castblast.specs.models.model import PAPER_FEATURES, PAPER_TARGETS, RidgeSpec
 from castblast.surrogate.fitting.features import read_table
 from castblast.surrogate.fitting.training import fit_spec
@@ -32,6 +36,21 @@ def test_the_file_says_what_a_reader_needs(text: str) -> None:
     assert provenance["spec"]["name"] == "ridge"
     assert 0.9 < provenance["scores"]["test"]["burden_velocity"]["r2"] <= 1.0
     assert provenance["band_coverage_on_test"]["burden_velocity"] > 0.8
+
+
+def test_a_file_of_version_1_opens() -> None:
+    network = toy_network()
+    first = replace(network.layers[0], weights=network.layers[0].weights[1:])
+    document = to_document(replace(
+        network, derived=(), density=None, members=(), layers=(first, *network.layers[1:])
+    ))  # fmt: skip
+    for key in ("derived", "density", "members"):
+        del document[key]
+    old = from_json(json.dumps(document | {"schema_version": 1}))
+    assert old.schema_version == 2
+    assert (old.derived, old.density, old.members) == ((), None, ())
+    rows = predict_rows(old, old.golden.inputs, np.zeros(200, dtype=np.int64))
+    assert np.isnan(rows.score).all()
 
 
 def test_no_times_or_paths_in_the_file(text: str) -> None:

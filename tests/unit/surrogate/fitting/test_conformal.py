@@ -64,12 +64,6 @@ def test_expected_share_of_a_sound_band() -> None:
     assert within == pytest.approx(0.953, abs=4 * math.sqrt(0.05 * 0.95 / 4000))
 
 
-def test_coverage_counts_rows() -> None:
-    predicted = np.full((10, 1), 10.0)
-    truth = predicted + 0.1 * np.arange(10)[:, None]
-    assert band_coverage(truth, predicted, np.array([0.0451]))[0].share == pytest.approx(0.5)
-
-
 def test_too_few_rows_or_a_prediction_of_zero_are_refused() -> None:
     with pytest.raises(DatasetError, match="19 rows are too few for a 95 % band"):
         conformal_band(np.ones((19, 1)), np.ones((19, 1)))

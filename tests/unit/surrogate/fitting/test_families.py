@@ -81,23 +81,16 @@ def check_parity(fit: Fit) -> None:
     assert np.isfinite(network.golden.outputs).all()
 
 
-@pytest.mark.parametrize("spec", EXPORTABLE, ids=lambda spec: spec.name)
+@pytest.mark.parametrize("spec", EXPORTABLE + TORCH, ids=lambda spec: spec.name)
 def test_network_is_the_estimator(spec: ModelSpec, table: Table) -> None:
+    if spec in TORCH:
+        pytest.importorskip("torch")
     fit = fit_spec(spec, table)
     check_parity(fit)
-    assert fit.scores("test")["burden_velocity"].r2 > 0.95
+    assert fit.scores("test")["burden_velocity"].r2 > (0.9 if spec in TORCH else 0.95)
     assert fit.network.derived == () or fit.network.derived[0].name == "stemming"
     copy = pickle.loads(pickle.dumps(fit))
     np.testing.assert_array_equal(copy.estimator.predict(table.frame), fit.predicted)
-
-
-@pytest.mark.parametrize("spec", TORCH, ids=lambda spec: spec.name)
-def test_torch_network_is_the_estimator(spec: ModelSpec, table: Table) -> None:
-    pytest.importorskip("torch")
-    fit = fit_spec(spec, table)
-    check_parity(fit)
-    assert fit.scores("test")["burden_velocity"].r2 > 0.9
-    assert pickle.loads(pickle.dumps(fit)).spec == spec
 
 
 @pytest.mark.parametrize("spec", OTHERS, ids=lambda spec: spec.name)
@@ -348,27 +341,6 @@ def test_faults_of_a_factory_are_told(
 ) -> None:
     with pytest.raises(SpecError, match=message):
         fit_spec(custom(own, function, **more), table)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("kind: custom\nfactory: linear\n", "factory: linear"),
-        ("kind: custom\nfactory: a:b\ntraining: {epochs: 3}\n", "training"),
-        ("kind: ridge\nfeatures: al\n", "features"),
-        ("kind: ridge\nderived: {x: {coefficients: {ucs: 1, burden: 1}}}\n", "different units"),
-        ("kind: ridge\nderived: {x: {coefficients: {uc: 1}}}\n", "did you mean 'ucs'"),
-        ("kind: ridge\nderived: {x: {coefficients: {spacing: 1}}}\n", "is no feature"),
-        ("kind: ridge\nderived: {ucs: {coefficients: {ucs: 1}}}\n", "name of a variable"),
-        ("kind: ridge\nlinear_features: [spacing]\n", "linear_features: unknown"),
-        ("kind: levenberg\nactivation: relu\n", "activation: relu"),
-    ],
-)
-def test_bad_settings_are_named(tmp_path: Path, text: str, message: str) -> None:
-    path = tmp_path / "mine.yaml"
-    path.write_text(text)
-    with pytest.raises(SpecError, match=message):
-        read_model_spec(path)
 
 
 def test_golden_rows_leave_out_what_cannot_be_logged(table: Table) -> None:

@@ -11,7 +11,6 @@ import pytest
 from castblast.errors import DatasetError, SpecError, Status
 from castblast.specs.models.model import PAPER_FEATURES, PAPER_TARGETS, MlpSpec, RidgeSpec
 from castblast.specs.recipe import SPLIT_NAMES
-from castblast.surrogate.fitting.column_checks import check_positive
 from castblast.surrogate.fitting.features import (
     SPLITS,
     Split,
@@ -145,14 +144,6 @@ def test_labels_need_meanings(toy_dataset) -> None:
     del dataset["split"].attrs["flag_meanings"]
     with pytest.raises(DatasetError, match="split: is no flag variable"):
         read_table(dataset, PAPER_FEATURES, PAPER_TARGETS)
-
-
-def test_logs_refuse_columns_that_reach_zero(toy_dataset) -> None:
-    dataset = toy_dataset(600)
-    dataset["crushed_zone_radius"][3] = 0.0
-    table = read_table(dataset, PAPER_FEATURES, PAPER_TARGETS)
-    with pytest.raises(DatasetError, match=r"crushed_zone_radius: 1 rows .*sample 3: 0 m"):
-        check_positive(table, PAPER_TARGETS)
 
 
 @pytest.mark.parametrize(

@@ -58,14 +58,6 @@ def test_a_power_law_is_found_exactly(toy_dataset) -> None:
         assert exponent == pytest.approx(expected.get(name, 0.0), abs=1e-9)
 
 
-def test_network_is_the_estimator(fit, table) -> None:
-    """The neutral record gives what scikit-learn gives, on every row of the dataset."""
-    values = {name: table.frame[name].to_numpy() for name in table.feature_names}
-    found = evaluate(fit.network, values, list(table.frame["explosive"]))
-    for j, name in enumerate(table.target_names):
-        np.testing.assert_allclose(found[name], fit.predicted[:, j], rtol=1e-12)
-
-
 def test_training_rows_lie_in_the_domain(fit, table) -> None:
     """All of them in the ranges and rules; by the joint density up to a per cent may be unusual."""
     train = table.frame.iloc[table.rows("train")][list(table.feature_names)]
@@ -133,7 +125,7 @@ def test_reaching_the_iteration_limit_is_recorded_not_shown(table) -> None:
 def test_a_log_model_refuses_a_target_of_zero(toy_dataset) -> None:
     dataset = toy_dataset(600)
     dataset["burden_velocity"][5] = 0.0
-    with pytest.raises(DatasetError, match="burden_velocity: 1 rows are not above 0"):
+    with pytest.raises(DatasetError, match=r"burden_velocity: 1 rows .*sample 5: 0 m"):
         fit_spec(POWER_LAW, read_table(dataset, PAPER_FEATURES, PAPER_TARGETS))
 
 
@@ -170,12 +162,6 @@ def test_the_best_exportable_is_chosen_and_the_gap_stated(table, fit) -> None:
             assert low <= figures["relative_error_95"] <= high
 
 
-def test_nothing_exportable_is_refused(table) -> None:
-    quadratic = fit_spec(POWER_LAW.model_copy(update={"degree": 2}), table)
-    with pytest.raises(SpecError, match="none of the models can be exported"):
-        compare([quadratic])
-
-
 def test_shipped_specs_are_read(repository: Path) -> None:
     specs = read_model_specs(sorted((repository / "models" / "specs").glob("*.yaml")))
     by_name = {spec.name: spec for spec in specs}
@@ -197,6 +183,15 @@ def test_shipped_specs_are_read(repository: Path) -> None:
         ("kind: mlp\ntargets: [ucs]\n", "targets: unknown variable 'ucs'"),
         ("kind: mlp\nfeatures: [ucs, ucs]\n", "given twice: ucs"),
         ("kind: mlp\nactivation: step\n", "activation: step"),
+        ("kind: levenberg\nactivation: relu\n", "activation: relu"),
+        ("kind: custom\nfactory: linear\n", "factory: linear"),
+        ("kind: custom\nfactory: a:b\ntraining: {epochs: 3}\n", "training"),
+        ("kind: ridge\nfeatures: al\n", "features"),
+        ("kind: ridge\nderived: {x: {coefficients: {ucs: 1, burden: 1}}}\n", "different units"),
+        ("kind: ridge\nderived: {x: {coefficients: {uc: 1}}}\n", "did you mean 'ucs'"),
+        ("kind: ridge\nderived: {x: {coefficients: {spacing: 1}}}\n", "is no feature"),
+        ("kind: ridge\nderived: {ucs: {coefficients: {ucs: 1}}}\n", "name of a variable"),
+        ("kind: ridge\nlinear_features: [spacing]\n", "linear_features: unknown"),
     ],
 )
 def test_bad_specs_are_named(tmp_path: Path, text: str, message: str) -> None:
