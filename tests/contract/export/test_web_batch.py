@@ -1,40 +1,16 @@
 """Tables in the web page: read as `castblast predict --csv` reads them, with the same answers."""
 
 import json
-import shutil
-import subprocess
-from typing import Any
+from functools import partial
 
 import pytest
+from page_scripts import ask, page_scripts
 
-from castblast.export.web import PAGE, to_web
 from castblast.prediction.answer import load_network
 from castblast.stages.predict_table import predict_csv
 
 NETWORK = load_network()
-
-
-@pytest.fixture(scope="module")
-def scripts() -> str:
-    """The scripts of the page that draw nothing."""
-    text = to_web(NETWORK)[PAGE].decode().split('<script type="module">')[1]
-    return text.split("/* The page: one state")[0].replace("<\\/", "</")
-
-
-@pytest.fixture
-def evaluated(scripts: str, tmp_path):
-    """Evaluate an expression with these scripts."""
-    node = shutil.which("node")
-    if node is None:
-        pytest.skip("node is not installed")
-
-    def evaluate(expression: str) -> Any:
-        file = tmp_path / "ask.mjs"
-        file.write_text(f"{scripts}\nconsole.log(JSON.stringify({expression}));\n")
-        done = subprocess.run([node, file], capture_output=True, text=True, check=True)
-        return json.loads(done.stdout)
-
-    return evaluate
+evaluated = partial(ask, page_scripts(NETWORK))
 
 
 DESIGNS = "id;explosive;burden [m];ucs [MPa];bench_height [m]\nH1;anfo;3,5;80;10\nH2;ANFO;4;;12,5\n"
@@ -58,7 +34,7 @@ TABLES = {
 
 
 @pytest.mark.parametrize("text", TABLES.values(), ids=TABLES)
-def test_a_table_is_read_as_predict_reads_it(evaluated, text: str, tmp_path) -> None:
+def test_a_table_is_read_as_predict_reads_it(text: str, tmp_path) -> None:
     """Ids, order, what is completed and the answers: the page against `predict --csv`."""
     found = evaluated(f"answerBatch({json.dumps(text)})")
     assert found["faults"] == []
@@ -91,13 +67,13 @@ def test_a_table_is_read_as_predict_reads_it(evaluated, text: str, tmp_path) -> 
         ("charge_length [m],stemming_length [m]\n5,2.5\n", "this network was trained on"),
     ],
 )  # fmt: skip
-def test_faults_of_a_table_are_named(evaluated, text: str, line: str) -> None:
+def test_faults_of_a_table_are_named(text: str, line: str) -> None:
     found = evaluated(f"answerBatch({json.dumps(text)})")
     assert found["rows"] == []
     assert line in found["faults"][0]
 
 
-def test_answers_are_no_formulas(evaluated) -> None:
+def test_answers_are_no_formulas() -> None:
     text = "id,burden [m]\n=1+1,3\n-12,3\n"
     answers = f"answerBatch({json.dumps(text)})"
     lines = evaluated(f"((a) => csvText(a.header, a.rows))({answers})").splitlines()
@@ -105,7 +81,7 @@ def test_answers_are_no_formulas(evaluated) -> None:
     assert lines[2].startswith("-12,anfo,")
 
 
-def test_encodings_of_a_table(evaluated) -> None:
+def test_encodings_of_a_table() -> None:
     text = "name;burden [m]\nBöschung;3,5\n"
     for data in (
         text.encode(),

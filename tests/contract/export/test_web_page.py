@@ -6,22 +6,20 @@ record can be held against that law.
 
 import json
 import re
-import shutil
-import subprocess
+from functools import partial
 from html.parser import HTMLParser
 from math import exp, log, pi
-from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
+from page_scripts import ask, page_scripts
 from toy_network import toy_network
 
 from castblast.bands import BASIS, THROW_FACTOR, THROW_SD
 from castblast.design.rule import complete_columns, design_faults, fault_columns, rules_as_data
 from castblast.disk.resources import resource
 from castblast.errors import SpecError
-from castblast.export.source.runners import run_program, written
 from castblast.export.web import PAGE, to_web
 from castblast.muckpile.results.ballistic import block_throw
 from castblast.network import Network, keeps_ranges_and_rules, predict_rows
@@ -75,31 +73,18 @@ def test_every_name_that_is_referred_to_is_there(page: str) -> None:
     assert asked <= set(ids)
 
 
-def in_node(network: Network, script: str) -> Any:
-    """Run a script with the model and the scripts of the page that draw nothing; its JSON back."""
-    node = shutil.which("node")
-    if node is None:
-        pytest.skip("node is not installed")
-    text = to_web(network)[PAGE].decode().split('<script type="module">')[1]
-    # Before the controls nothing asks for a document until it is called.
-    computing = text.split("/* Explosive tabs, sliders and number fields. */")[0]
-    program = computing.replace("<\\/", "</") + script
-    with written({"page.mjs": program.encode()}) as folder:
-        return json.loads(run_program([node, folder / "page.mjs"]))
-
-
 def test_the_page_shows_the_bands_of_python() -> None:
     """Values and prediction bands of tiles and batch; the throw is free flight times its factor."""
     network = toy_network()
     design = {"bench_height": 12.0, "charge_length": 5.0, "burden": 2.0}
-    rows, batch = in_node(
-        network,
-        f"""
+    rows, batch = ask(
+        page_scripts(network),
+        f"""(() => {{
         const design = {{ explosive: "heavy_anfo", values: {json.dumps(design)} }};
         const {{ header, rows }} = answerBatch(batchTemplate(design));
         const of = Object.fromEntries(header.map((head, i) => [head, rows[1][i]]));
-        console.log(JSON.stringify([resultsOf(design).rows, of]));
-        """,
+        return [resultsOf(design).rows, of];
+        }})()""",
     )
     tiles = {row["key"]: row for row in rows}
     numeric = np.array([[design[name] for name in network.input_names]])
@@ -236,22 +221,10 @@ def test_the_shipped_page_is_there(tmp_path) -> None:
 
 
 @pytest.fixture(scope="module", params=["full", "paper"])
-def ask(request, tmp_path_factory):
+def asked(request):
     """Network, and a function that evaluates an expression with the scripts of its page."""
-    node = shutil.which("node")
-    if node is None:
-        pytest.skip("node is not installed")
     network = load_network(request.param)
-    text = to_web(network)[PAGE].decode().split('<script type="module">')[1]
-    scripts = text.split("/* The page: one state")[0].replace("<\\/", "</")
-    file = tmp_path_factory.mktemp("page") / "ask.mjs"
-
-    def evaluated(expression: str):
-        file.write_text(f"{scripts}\nconsole.log(JSON.stringify({expression}));\n")
-        done = subprocess.run([node, file], capture_output=True, text=True, check=True)
-        return json.loads(done.stdout)
-
-    return network, evaluated
+    return network, partial(ask, page_scripts(network))
 
 
 def as_charged(network, values: dict) -> dict:
@@ -272,9 +245,9 @@ DESIGNS = (
 )
 
 
-def test_the_page_refuses_and_completes_as_the_rule_does(ask) -> None:
+def test_the_page_refuses_and_completes_as_the_rule_does(asked) -> None:
     """14 m of stemming in a bench of 12.5 m: no answer, and not a charge of -1.5 m."""
-    network, evaluated = ask
+    network, evaluated = asked
     rows = [as_charged(network, values) for values in DESIGNS]
     found = evaluated(
         f"{json.dumps(rows)}.map((values) => "
@@ -299,8 +272,8 @@ def test_the_page_carries_the_rule_as_data(page: str) -> None:
     assert "?? full.burden" not in scripts
 
 
-def test_refusals_are_said_in_words_and_in_the_units_of_the_reader(ask) -> None:
-    network, evaluated = ask
+def test_refusals_are_said_in_words_and_in_the_units_of_the_reader(asked) -> None:
+    network, evaluated = asked
     row = as_charged(network, {"stemming_length": 12.0})
     if "stemming_length" not in network.input_names:
         row["charge_length"] = 0.5
@@ -320,8 +293,8 @@ def table_head(network: Network) -> str:
     return ",".join(["explosive", *(f"{c.name} [{c.unit}]" for c in network.inputs)])
 
 
-def test_a_table_of_designs_tells_impossible_ones_by_line(ask) -> None:
-    network, evaluated = ask
+def test_a_table_of_designs_tells_impossible_ones_by_line(asked) -> None:
+    network, evaluated = asked
     good = as_charged(network, {})
     bad = good | {"bench_height": 2.0}
     text = "\n".join(
@@ -336,9 +309,9 @@ def test_a_table_of_designs_tells_impossible_ones_by_line(ask) -> None:
     assert all(fault.startswith("line 3: ") for fault in found["faults"])
 
 
-def test_spacing_and_stemming_go_with_the_burden(ask) -> None:
+def test_spacing_and_stemming_go_with_the_burden(asked) -> None:
     """Ratios 1.2 and 0.8 at a burden of 3 m are kept at 4.5 m."""
-    network, evaluated = ask
+    network, evaluated = asked
     row = as_charged(network, {"burden": 3.0, "spacing": 3.6, "stemming_length": 2.4})
     design = json.dumps({"explosive": "anfo", "values": row})
     moved = evaluated(f"completed({{ values: valuesAtBurden({design}, 4.5, ratiosOf({design})) }})")
@@ -348,9 +321,9 @@ def test_spacing_and_stemming_go_with_the_burden(ask) -> None:
     assert moved["spacing"] == pytest.approx(spacing)
 
 
-def test_the_shaded_range_is_where_the_design_stays_valid(ask) -> None:
+def test_the_shaded_range_is_where_the_design_stays_valid(asked) -> None:
     """Each step of each slider against Python: possible, and not outside the domain."""
-    network, evaluated = ask
+    network, evaluated = asked
     row = as_charged(network, {})
     design = {"explosive": "anfo", "values": row}
     for name in ("burden", "bench_height", "hole_diameter"):

@@ -4,22 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from near_field_problems import ANFO, EMULSION
 
 from castblast.burden.batch import BurdenBatch, BurdenColumns, solve_burden_motions
 from castblast.burden.case import BurdenGeometry, BurdenParameters
 from castblast.burden.motion import solve_burden_motion
 from castblast.design.variables import VARIABLES
 from castblast.errors import Status
-from castblast.explosive.isentrope import Explosive, jwl_isentrope, pressure, tabulated_isentrope
+from castblast.explosive.isentrope import pressure, tabulated_isentrope
 
-ANFO = Explosive(
-    800.0, 4806.0, 3.75e6, 3.2938e9, 0.0, 1.0,
-    jwl_isentrope(141.731e9, 2.4178e9, 0.8586e9, 5.4081, 1.2931, 0.3510),
-)  # fmt: skip
-EMULSION = Explosive(
-    1150.0, 6129.0, 2.62e6, 3.6304e9, 0.0, 1.0,
-    jwl_isentrope(563.384e9, 6.7052e9, 0.7578e9, 5.7557, 1.4798, 0.3898),
-)  # fmt: skip
 _VOLUME = np.geomspace(0.73, 700.0, 40)
 TABLE = ANFO._replace(
     isentrope=tabulated_isentrope(_VOLUME, [pressure(ANFO.isentrope, float(v)) for v in _VOLUME])

@@ -7,17 +7,13 @@ from math import pi
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from near_field_problems import ANFO
 
 from castblast.burden.case import BurdenGeometry, BurdenParameters
 from castblast.burden.motion import solve_burden_motion
 from castblast.design.variables import BURDEN_PARAMETER_SETS, VARIABLES
 from castblast.errors import Status
-from castblast.explosive.isentrope import Explosive, jwl_isentrope
 
-ANFO = Explosive(
-    800.0, 4806.0, 3.75e6, 3.2938e9, 0.0, 1.0,
-    jwl_isentrope(141.731e9, 2.4178e9, 0.8586e9, 5.4081, 1.2931, 0.3510),
-)  # fmt: skip
 DESIGN = st.fixed_dictionaries(
     {
         "parameter_set": st.sampled_from(sorted(BURDEN_PARAMETER_SETS)),

@@ -26,15 +26,12 @@ from castblast.design.rule import (
 )
 from castblast.design.variables import INPUTS, VARIABLES
 from castblast.errors import SpecError
-from castblast.explosive.isentrope import Explosive, jwl_isentrope
 from castblast.nearfield.solver import solve_near_field
 from castblast.prediction.answer import load_network, predict
 from castblast.prediction.columns import predict_columns
+from castblast.specs.explosive import load_explosive
 
-ANFO = Explosive(
-    800.0, 4806.0, 3.75e6, 3.2938e9, 0.211, 0.84,
-    jwl_isentrope(141.731e9, 2.4178e9, 0.8586e9, 5.4081, 1.2931, 0.3510),
-)  # fmt: skip
+ANFO = load_explosive("anfo").to_explosive()
 NETWORKS = {name: load_network(name) for name in ("full", "paper")}
 #: What shapes a bench, often possible; the rest of the table over its bounds and beyond.
 SHAPE = {

@@ -11,13 +11,11 @@ from castblast.blast.run import BlastSettings, make_case, result_values, run_bla
 from castblast.burden.case import BurdenParameters
 from castblast.design.variables import BURDEN_PARAMETER_SETS, INPUT_NAMES, INPUTS, OUTPUT_NAMES
 from castblast.errors import SpecError, Status
-from castblast.explosive.isentrope import Explosive, in_hole_velocity, jwl_isentrope
+from castblast.explosive.isentrope import in_hole_velocity
 from castblast.nearfield.case import EndMode, TensionMode
+from castblast.specs.explosive import load_explosive
 
-ANFO = Explosive(
-    800.0, 4806.0, 3.75e6, 3.2938e9, 0.211, 0.84,
-    jwl_isentrope(141.731e9, 2.4178e9, 0.8586e9, 5.4081, 1.2931, 0.3510),
-)  # fmt: skip
+ANFO = load_explosive("anfo").to_explosive()
 
 
 def faults(**values: float) -> list[str]:

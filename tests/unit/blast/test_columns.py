@@ -19,13 +19,10 @@ from castblast.blast.run import (
 from castblast.dataset.rows.simulation import HISTORY_NAMES, BlastSimulator
 from castblast.design.variables import OUTPUT_NAMES
 from castblast.errors import SpecError, Status
-from castblast.explosive.isentrope import Explosive, jwl_isentrope
 from castblast.nearfield.case import EndMode
+from castblast.specs.explosive import load_explosive
 
-ANFO = Explosive(
-    800.0, 4806.0, 3.75e6, 3.2938e9, 0.211, 0.84,
-    jwl_isentrope(141.731e9, 2.4178e9, 0.8586e9, 5.4081, 1.2931, 0.3510),
-)  # fmt: skip
+ANFO = load_explosive("anfo").to_explosive()
 EXPLOSIVES = (ANFO, ANFO._replace(density=1000.0, detonation_velocity=5400.0))
 INDEX = np.array([0, 1, 0, 1, 1, 0], dtype=np.int8)
 #: Different rock, bench and near-field meshes; the rate factor is one that must not be lost.
@@ -62,14 +59,6 @@ def test_every_row_is_the_blast_it_would_be_alone(batch):
         for name in HISTORY_NAMES:
             expected = getattr(alone.near_field, name)
             assert getattr(batch.near_field, name)[i] == pytest.approx(expected, rel=1e-10)
-
-
-def test_order_and_company_do_not_matter(batch):
-    """To the bit: a row of a dataset must not depend on the shard it is computed in."""
-    order = np.array([5, 2, 4])
-    some = run_blasts(EXPLOSIVES, INDEX[order], {k: v[order] for k, v in VALUES.items()}, SETTINGS)
-    for name, values in batch_values(some).items():
-        assert np.array_equal(values, batch_values(batch)[name][order]), name
 
 
 def test_failed_near_field_leaves_no_numbers_in_its_row(batch, monkeypatch):

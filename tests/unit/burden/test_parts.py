@@ -6,6 +6,7 @@ from math import e, exp, nan, pi, radians, sqrt
 
 import numpy as np
 import pytest
+from near_field_problems import ANFO
 
 from castblast.burden.case import BurdenGeometry, BurdenParameters
 from castblast.burden.dop853 import (
@@ -27,14 +28,9 @@ from castblast.burden.stemming import leakage_flux, stemming_acceleration
 from castblast.burden.venting import ATMOSPHERIC_PRESSURE, fracture_flux, gas_outflow
 from castblast.design.variables import VARIABLES
 from castblast.errors import Status
-from castblast.explosive.isentrope import Explosive, jwl_isentrope
 
 BENCH = BurdenGeometry(3.0, 4.0, 10.0, radians(60.0), 2.0, 8.0, 2500.0, 0.1, 0.08)
 MODEL = BurdenParameters(**{n: float(VARIABLES[n].default or 0) for n in BurdenParameters._fields})
-ANFO = Explosive(
-    800.0, 4806.0, 3.75e6, 3.2938e9, 0.0, 1.0,
-    jwl_isentrope(141.731e9, 2.4178e9, 0.8586e9, 5.4081, 1.2931, 0.3510),
-)  # fmt: skip
 STATE = (200e6, 242.0, 1.83)
 DENSE = gas_outflow(*STATE)
 

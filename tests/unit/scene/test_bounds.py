@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
+from small_bench import SMALL, write_bench
 
 from castblast.errors import SpecError
 from castblast.muckpile.balls.contact import ContactLaw
@@ -23,17 +23,11 @@ from castblast.specs.bench.bench import BenchSpec
 from castblast.stages.muckpile.extras import Extras
 from castblast.stages.muckpile.run import run_muckpile
 
-BENCH: dict[str, Any] = {
-    "name": "small",
-    "bench": {"length": "4 m", "width": "4 m", "height": "3 m", "burden": "2 m", "spacing": "2 m"},
-    "velocity": "6 m/s",
-    "balls": {"count": 250},
-}
 SIZES = BallSizes(250, 0.1, 0.3, 0.01)
 
 
 def spec(**changes: Any) -> BenchSpec:
-    return BenchSpec.model_validate(BENCH | changes)
+    return BenchSpec.model_validate(SMALL | changes)
 
 
 @pytest.mark.parametrize(
@@ -57,7 +51,7 @@ def spec(**changes: Any) -> BenchSpec:
             "small: balls.mean_radius: 0.006 m: 25,",
         ),
         (
-            {"bench": BENCH["bench"] | {"spacing": "1 mm", "burden": "1 mm"}},
+            {"bench": SMALL["bench"] | {"spacing": "1 mm", "burden": "1 mm"}},
             Extras(),
             "burden 0.001 m, spacing 0.001 m: cut the bench into 1.6e+07 blocks; allowed: 100,000",
         ),
@@ -81,8 +75,7 @@ def test_the_absurd_is_refused_before_anything_is_packed(
     monkeypatch.setattr(bounds, "require_memory", lambda *_: None)
     monkeypatch.setattr("castblast.stages.muckpile.extras.check_frames", lambda *_, **__: None)
     monkeypatch.setattr("castblast.scene.start.fill_bench", lambda *_, **__: 1 / 0)
-    path = tmp_path / "bench.yaml"
-    path.write_text(yaml.safe_dump(BENCH | changes))
+    path = write_bench(tmp_path, **changes)
     with pytest.raises(SpecError) as caught:
         run_muckpile(path, tmp_path / "out", threads=2, extras=extras)
     assert words in str(caught.value)
@@ -90,9 +83,8 @@ def test_the_absurd_is_refused_before_anything_is_packed(
 
 
 def test_the_option_for_balls_has_the_bounds_of_the_file(tmp_path: Path) -> None:
-    (tmp_path / "bench.yaml").write_text(yaml.safe_dump(BENCH))
     with pytest.raises(SpecError, match=r"--balls: 10,000,000: allowed: 10 to 5,000,000"):
-        run_muckpile(tmp_path / "bench.yaml", tmp_path / "out", balls=10_000_000)
+        run_muckpile(write_bench(tmp_path), tmp_path / "out", balls=10_000_000)
 
 
 def test_what_a_bench_of_today_asks_for_is_allowed(tmp_path: Path) -> None:

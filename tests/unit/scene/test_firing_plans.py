@@ -15,7 +15,6 @@ from castblast.muckpile.bench.geometry import Bench, block_centres
 from castblast.muckpile.bench.timing import (
     echelon_delays,
     firing_front_azimuth,
-    nearest_holes,
     row_delays,
     scatter_delays,
     v_delays,
@@ -70,11 +69,6 @@ def test_scatter_of_detonators() -> None:
     assert not np.array_equal(fired, scatter_delays(delay, 8, relative=0.02, absolute=0.001))
     assert scatter_delays(np.zeros(1000), 1, absolute=0.01).min() == 0.0
     np.testing.assert_array_equal(scatter_delays(delay, 1), delay)
-
-
-def test_balls_go_to_the_nearest_hole() -> None:
-    holes = np.array([(-1.0, 1.0), (-5.0, 8.0)])
-    assert nearest_holes(np.array([(0.0, 0.0, 9.0), (-4.0, 6.0, 0.0)]), holes).tolist() == [0, 1]
 
 
 def holes_file(folder: Path, *lines: str, head: str = HEAD) -> Path:

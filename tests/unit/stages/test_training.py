@@ -16,7 +16,6 @@ from castblast.prediction.answer import predict
 from castblast.stages.comparison.run import compare
 from castblast.stages.export import export
 from castblast.stages.outcome import Outcome
-from castblast.stages.predict import predict_design
 from castblast.stages.predict_table import predict_csv
 from castblast.stages.training.train import train
 
@@ -68,15 +67,6 @@ def _bytes(folder: Path) -> dict[str, bytes]:
     }
 
 
-def _same(folder: Path) -> dict[str, bytes]:
-    """Files that are a function of dataset and specs: no times, no place."""
-    return {
-        name: content
-        for name, content in _bytes(folder).items()
-        if not name.endswith(("timings.json", "timings.html", "dataset.txt"))
-    }
-
-
 def test_fits_leave_scores_tables_and_pictures(fits: Path) -> None:
     files = ("fit.json", "network.json", "parity.png", "test_rows.csv")
     expected = {f"{name}/{file}" for name in MODELS for file in files}
@@ -97,36 +87,6 @@ def test_a_comparison_leaves_league_curves_and_page(comparison: Path) -> None:
     assert "fit_seconds" in (comparison / "timings.json").read_text()
     assert "fit [s]" in (comparison / "timings.html").read_text(encoding="utf-8")
     assert "[s]" not in page, "what is hashed holds no time"
-
-
-def test_tracking_changes_no_byte(source, comparison: Path, tmp_path: Path) -> None:
-    """The lab book observes: every file of the run without it is the same with it.
-
-    The book holds one run per fit under a parent, dataset and signature with each model, and the
-    chosen model under the alias champion.
-    """
-    mlflow = pytest.importorskip("mlflow")
-    before = mlflow.get_tracking_uri()
-    _compare(source, tmp_path, tracking=True, runs=tmp_path / "runs")
-    for folder in ("comparison", "fits"):
-        assert _same(tmp_path / folder) == _same(comparison.parent / folder)
-    assert mlflow.get_tracking_uri() == before
-    uri = f"sqlite:///{tmp_path / 'runs' / 'mlflow.db'}"
-    client = mlflow.MlflowClient(uri, registry_uri=uri)
-    (experiment,) = [e for e in client.search_experiments() if e.name == "toy/1"]
-    runs = client.search_runs([experiment.experiment_id])
-    assert len(runs) == 3
-    fitted = [run for run in runs if "spec.sha256" in run.data.tags]
-    for run in fitted:
-        assert "test_p95_rel_err_burden_velocity" in run.data.metrics
-        assert run.inputs.dataset_inputs[0].dataset.name == "toy"
-    champion = client.get_model_version_by_alias("castblast_toy", "champion")
-    chosen = json.loads((comparison / "comparison.json").read_text())["chosen"]
-    assert f"/{chosen}/" in client.get_run(champion.run_id).info.run_name
-    (model,) = (tmp_path / "runs" / "artifacts").glob(f"models/{champion.source.split('/')[-1]}")
-    signature = (model / "artifacts" / "MLmodel").read_text()
-    assert "signature:" in signature
-    assert "burden_velocity" in signature
 
 
 def test_export_finds_the_chosen_fit(fits: Path, comparison: Path, network: Path) -> None:
@@ -181,15 +141,6 @@ def test_inputs_that_the_network_cannot_see_are_named(network: Path) -> None:
     assert answer["out_of_domain"] == ["poisson_ratio", "spacing"]
     assert "has no effect in this network, trained at 0.25" in answer["domain_faults"][0]
     assert answer["domain_kinds"] == ["unseen", "unseen"]
-
-
-def test_prediction_from_quantities(network: Path) -> None:
-    answer = predict_design({"burden": "300 cm", "ucs": "80 MPa"}, "anfo", network)
-    assert answer.document["inputs"]["burden"] == pytest.approx(3.0)
-    assert [row[0] for row in answer.rows][1] == "burden velocity"
-    assert answer.document["burden_velocity"] == pytest.approx(
-        predict({"burden": 3.0, "ucs": 8e7}, "anfo", network)["burden_velocity"], rel=1e-12
-    )
 
 
 def test_csv_of_designs(network: Path, tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -27,19 +28,25 @@ sys.exit(main(["simulate", "--set", "zones=20000"]))
 """
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_long_near_field_hears_a_signal(tmp_path: Path, number: int, code: int) -> None:
-    """20,000 zones take minutes in one call of compiled code."""
+def started(*arguments: object, **options: Any) -> subprocess.Popen[str]:
+    """A Python process that has said that its work has begun."""
     process = subprocess.Popen(
-        [sys.executable, "-c", SIMULATE],
+        [sys.executable, *map(str, arguments)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+        **options,
     )
     assert process.stdout is not None
     assert process.stdout.readline() == "begun\n"
+    return process
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_long_near_field_hears_a_signal(tmp_path: Path, number: int, code: int) -> None:
+    """20,000 zones take minutes in one call of compiled code."""
+    process = started("-c", SIMULATE, cwd=tmp_path)
     time.sleep(1.0)
     assert process.poll() is None
     begun = time.monotonic()
@@ -73,16 +80,7 @@ def test_processes_at_work_end_without_a_word(tmp_path: Path, delay: float) -> N
     """Ctrl-C of a terminal goes to all processes, those that just start and those at work."""
     script = tmp_path / "jobs.py"
     script.write_text(JOBS)
-    process = subprocess.Popen(
-        [sys.executable, script],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-    )
-    assert process.stdout is not None
-    assert process.stdout.readline() == "begun\n"
+    process = started(script, start_new_session=True)
     time.sleep(delay)
     begun = time.monotonic()
     os.killpg(process.pid, signal.SIGINT)

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -196,6 +197,7 @@ def test_unwritable_folders_are_named_first(
 
 
 def test_two_at_a_time_give_the_same_bytes(source, whole: Path, tmp_path: Path) -> None:
+    """With the lab book, which only observes, and without it."""
     _compare(source, tmp_path, workers=2)
     assert _same(tmp_path) == _same(whole)
 
@@ -221,15 +223,39 @@ def test_results_come_in_the_order_of_the_jobs() -> None:
     assert len(kept) == 4
 
 
-def test_runs_are_listed(whole: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The list agrees with what MLflow itself says of its store."""
+def _book(whole: Path) -> tuple[Any, dict[str, Any]]:
+    """Client of MLflow for the lab book of the comparison, and its runs by their id."""
     mlflow = pytest.importorskip("mlflow")
-    assert main(["runs", str(whole / "runs"), "--json"]) == 0
-    listed = json.loads(capsys.readouterr().out)["runs"]
     uri = f"sqlite:///{whole / 'runs' / 'mlflow.db'}"
+    assert mlflow.get_tracking_uri() != uri, "the book is not left open"
     client = mlflow.MlflowClient(uri, registry_uri=uri)
     (experiment,) = [e for e in client.search_experiments() if e.name == "toy/1"]
-    stored = {run.info.run_id: run for run in client.search_runs([experiment.experiment_id])}
+    runs = client.search_runs([experiment.experiment_id])
+    return client, {run.info.run_id: run for run in runs}
+
+
+def test_the_book_holds_fits_with_their_data_and_the_champion(whole: Path) -> None:
+    """One run per fit under a parent, the dataset with each, the chosen model as champion."""
+    client, runs = _book(whole)
+    fitted = [run for run in runs.values() if "spec.sha256" in run.data.tags]
+    assert len(fitted) == len(runs) - 1 == 3
+    for run in fitted:
+        assert "test_p95_rel_err_burden_velocity" in run.data.metrics
+        assert run.inputs.dataset_inputs[0].dataset.name == "toy"
+    champion = client.get_model_version_by_alias("castblast_toy", "champion")
+    chosen = json.loads((whole / "comparison" / "comparison.json").read_text())["chosen"]
+    assert f"/{chosen}/" in client.get_run(champion.run_id).info.run_name
+    (model,) = (whole / "runs" / "artifacts").glob(f"models/{champion.source.split('/')[-1]}")
+    signature = (model / "artifacts" / "MLmodel").read_text()
+    assert "signature:" in signature
+    assert "burden_velocity" in signature
+
+
+def test_runs_are_listed(whole: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The list agrees with what MLflow itself says of its store."""
+    _, stored = _book(whole)
+    assert main(["runs", str(whole / "runs"), "--json"]) == 0
+    listed = json.loads(capsys.readouterr().out)["runs"]
     assert {entry["run_id"] for entry in listed} == set(stored)
     for entry in listed:
         run = stored[entry["run_id"]]

@@ -9,12 +9,13 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import yaml
+from small_bench import write_bench
 
 from castblast.disk.locks import LOCK_NAME, LockedError, only_writer
 from castblast.errors import OutputError
@@ -25,22 +26,14 @@ from castblast.stages.muckpile.run import run_muckpile
 
 resource = pytest.importorskip("resource", reason="signals and limits of POSIX")
 
+
 #: Some seconds of small steps.
-SLOW: dict[str, Any] = {
-    "name": "slow",
-    "bench": {"length": "4 m", "width": "4 m", "height": "3 m", "burden": "2 m", "spacing": "2 m"},
-    "velocity": "6 m/s",
-    "balls": {"count": 200},
-    "stop": {"longest_time": "0.4 s"},
-    "numerics": {"time_step": "1e-5 s"},
-}
-
-
-def written(folder: Path, **changes: Any) -> Path:
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / "bench.yaml"
-    path.write_text(yaml.safe_dump(SLOW | changes))
-    return path
+written = partial(
+    write_bench,
+    balls={"count": 200},
+    stop={"longest_time": "0.4 s"},
+    numerics={"time_step": "1e-5 s"},
+)
 
 
 def start(*arguments: str | Path, **options: Any) -> subprocess.Popen[str]:

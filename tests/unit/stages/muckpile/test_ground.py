@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from small_bench import write_bench
 
 from castblast.api.muckpile.document import bench_content
 from castblast.errors import SpecError
@@ -19,12 +20,6 @@ from castblast.stages.muckpile import run as muckpile
 from castblast.stages.muckpile.deck import Decks
 from castblast.stages.muckpile.run import run_muckpile
 
-SMALL: dict[str, Any] = {
-    "name": "small",
-    "bench": {"length": "4 m", "width": "4 m", "height": "3 m", "burden": "2 m", "spacing": "2 m"},
-    "velocity": "6 m/s",
-    "balls": {"count": 150},
-}
 X, Y = np.arange(0.0, 9.0), np.arange(-6.0, 11.0)
 
 
@@ -48,13 +43,10 @@ def ends(monkeypatch: pytest.MonkeyPatch) -> list[tuple[CastCase, CastResult]]:
 
 def written(folder: Path, height: np.ndarray | None = None, **change: Any) -> Path:
     """Bench file; with heights also their file, which begins 3 m before the face."""
-    content = SMALL | change
     if height is not None:
         np.savez(folder / "pile.npz", x=X, y=Y, height=height)
-        content |= {"ground": {"heightmap": "pile.npz", "shift": ["3 m", "0 m", "0 m"]}}
-    path = folder / "bench.yaml"
-    path.write_text(yaml.safe_dump(content))
-    return path
+        change |= {"ground": {"heightmap": "pile.npz", "shift": ["3 m", "0 m", "0 m"]}}
+    return write_bench(folder, **change)
 
 
 def test_rock_comes_to_rest_on_the_ground(

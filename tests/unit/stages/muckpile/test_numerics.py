@@ -2,30 +2,22 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import pytest
-import yaml
+from small_bench import write_bench
 
 from castblast.errors import SpecError
 from castblast.specs.bench.bench import load_bench
 from castblast.stages.muckpile.run import run_muckpile
 
-BENCH: dict[str, Any] = {
-    "name": "heap",
-    "bench": {"length": "4 m", "width": "4 m", "height": "3 m", "burden": "2 m", "spacing": "2 m"},
-    "velocity": "6 m/s",
-    "balls": {"count": 100},
-    "stop": {"longest_time": "0.05 s"},
-    "numerics": {"step_safety": 0.7},
-}
-
-
-def written(folder: Path, **change: Any) -> Path:
-    path = folder / "bench.yaml"
-    path.write_text(yaml.safe_dump(BENCH | change))
-    return path
+written = partial(
+    write_bench,
+    balls={"count": 100},
+    stop={"longest_time": "0.05 s"},
+    numerics={"step_safety": 0.7},
+)
 
 
 def test_defaults_and_file(tmp_path: Path) -> None:

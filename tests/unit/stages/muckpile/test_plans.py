@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import yaml
+from small_bench import SMALL, write_bench
 
 from castblast.errors import SpecError
 from castblast.muckpile.balls.contact import ContactLaw
@@ -23,26 +24,14 @@ from castblast.stages.muckpile.run import run_muckpile
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
 
-SMALL: dict[str, Any] = {
-    "name": "small",
-    "bench": {"length": "4 m", "width": "4 m", "height": "3 m", "burden": "2 m", "spacing": "2 m"},
-    "velocity": "6 m/s",
-    "balls": {"count": 150},
-    "stop": {"longest_time": "0.1 s"},
-}
+
+written = partial(write_bench, stop={"longest_time": "0.1 s"})
 
 
 @pytest.fixture
 def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out files and pictures, which take ten times as long as these small casts."""
     monkeypatch.setattr("castblast.stages.muckpile.run.write_results", lambda *_, **__: [])
-
-
-def written(folder: Path, **change: Any) -> Path:
-    path = folder / "bench.yaml"
-    content = {k: v for k, v in (SMALL | change).items() if v is not None}
-    path.write_text(yaml.safe_dump(content))
-    return path
 
 
 def said(folder: Path, **change: Any) -> str:

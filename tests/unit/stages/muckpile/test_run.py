@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import yaml
+from small_bench import SMALL, write_bench
 
 from castblast.api.muckpile.document import metric_rows
 from castblast.bands import BAND_WORDS, BASIS, show_band, show_value
@@ -18,12 +20,6 @@ from castblast.stages.muckpile.compare import run_seeds
 from castblast.stages.muckpile.extras import Extras
 from castblast.stages.muckpile.run import run_muckpile
 
-SMALL: dict[str, Any] = {
-    "name": "small",
-    "bench": {"length": "4 m", "width": "4 m", "height": "3 m", "burden": "2 m", "spacing": "2 m"},
-    "velocity": "6 m/s",
-    "balls": {"count": 250},
-}
 FILES = (
     "blocks.csv",
     "energy.png",
@@ -41,16 +37,13 @@ FILES = (
 )
 
 
-def written(folder: Path, content: object) -> Path:
-    path = folder / "bench.yaml"
-    path.write_text(yaml.safe_dump(content))
-    return path
+written = partial(write_bench, balls={"count": 250})
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, dict[str, Any]]:
     folder = tmp_path_factory.mktemp("muckpile")
-    bench = written(folder, SMALL)
+    bench = written(folder)
     shares: list[float] = []
     outcome = run_muckpile(
         bench, folder / "out", threads=1, progress=lambda share, _: shares.append(share)
@@ -109,8 +102,7 @@ def test_a_given_velocity_is_said_to_be_given(run: tuple[Path, Path, dict[str, A
 def test_a_predicted_velocity_has_its_band_and_its_domain(tmp_path: Path) -> None:
     """A bench of 3 m is lower than any in training: said in words, with the value at fault."""
     surrogate = {"explosive": "anfo", "hole_diameter": "102 mm", "stemming_length": "1 m"}
-    spec = {k: v for k, v in SMALL.items() if k != "velocity"}
-    bench = written(tmp_path, spec | {"surrogate": surrogate, "balls": {"count": 60}})
+    bench = written(tmp_path, velocity=None, surrogate=surrogate, balls={"count": 60})
     outcome = run_muckpile(bench, tmp_path / "out", threads=1)
     stored = json.loads((tmp_path / "out" / "metrics.json").read_text())
     asked = {name: stored["surrogate"]["inputs"][name] for name in ("burden", "bench_height")}
@@ -136,7 +128,7 @@ def test_ore_and_frames(run: tuple[Path, Path, dict[str, Any]], tmp_path: Path) 
     corners = [[-4, 0], [-2, 0], [-2, 4], [-4, 4]]
     polygons = [{"name": "rear", "grade": 3.0, "corners": corners}]
     (tmp_path / "ore.yaml").write_text(yaml.safe_dump({"polygons": polygons}))
-    bench = written(tmp_path, SMALL | {"ore": "ore.yaml"})
+    bench = written(tmp_path, ore="ore.yaml")
     extras = Extras(dig_block="1 m", animation="gif", frame_interval="0.2 s")
     outcome = run_muckpile(bench, tmp_path, threads=1, packings=out / "packings", extras=extras)
     assert outcome.document["packing_reused"]
@@ -158,7 +150,7 @@ def test_ore_and_frames(run: tuple[Path, Path, dict[str, Any]], tmp_path: Path) 
 
 
 def test_bands_over_seeds(tmp_path: Path) -> None:
-    bench = written(tmp_path, SMALL)
+    bench = written(tmp_path)
     outcome = run_seeds(bench, tmp_path / "out", 2, threads=1)
     found = [json.loads((tmp_path / f"out/seed_{k}/metrics.json").read_text()) for k in (0, 1)]
     assert found[0]["throw"] != found[1]["throw"]
@@ -172,17 +164,18 @@ def test_a_file_of_balls(run: tuple[Path, Path, dict[str, Any]], tmp_path: Path)
     _, out, _ = run
     with np.load(out / "final_state.npz") as final:
         np.savez(tmp_path / "balls.npz", x=final["x_before"], r=final["r"])
-    content = SMALL | {"balls": "balls.npz", "firing": {"pattern": "none"}}
-    del content["velocity"]
-    content["bench"] = SMALL["bench"] | {"rear": False}
-    document = run_muckpile(written(tmp_path, content), tmp_path / "out", threads=1).document
+    bench = written(
+        tmp_path, velocity=None, balls="balls.npz", firing={"pattern": "none"},
+        bench=SMALL["bench"] | {"rear": False},
+    )  # fmt: skip
+    document = run_muckpile(bench, tmp_path / "out", threads=1).document
     assert document["initial_velocity"] == 0.0
     assert document["balls"] == len(np.load(tmp_path / "balls.npz")["r"])
     assert document["throw"][2] < -0.2
     # It spreads to both sides: no direction is preferred.
     assert abs(document["throw"][0]) < 0.3
     with pytest.raises(SpecError, match="takes its balls from"):
-        run_muckpile(tmp_path / "bench.yaml", tmp_path / "out", balls=100)
+        run_muckpile(bench, tmp_path / "out", balls=100)
 
 
 @pytest.mark.parametrize(
@@ -199,6 +192,6 @@ def test_a_file_of_balls(run: tuple[Path, Path, dict[str, Any]], tmp_path: Path)
 )
 def test_options_that_cannot_be(tmp_path: Path, options: dict[str, Any], line: str) -> None:
     with pytest.raises(SpecError) as caught:
-        run_muckpile(written(tmp_path, SMALL), tmp_path / "out", **options)
+        run_muckpile(written(tmp_path), tmp_path / "out", **options)
     assert line in str(caught.value)
     assert not any((tmp_path / "out").glob("*.npz"))

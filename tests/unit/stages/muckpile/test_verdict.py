@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
+from small_bench import write_bench
 
 from castblast.cli import main
 from castblast.muckpile.cast.solver import CastResult, run_cast
@@ -15,19 +16,7 @@ from castblast.stages.muckpile import run as muckpile
 from castblast.stages.muckpile.compare import compare_runs
 from castblast.stages.muckpile.run import run_muckpile
 
-SMALL: dict[str, Any] = {
-    "name": "small",
-    "bench": {"length": "4 m", "width": "4 m", "height": "3 m", "burden": "2 m", "spacing": "2 m"},
-    "velocity": "6 m/s",
-    "balls": {"count": 200},
-    "stop": {"longest_time": "0.3 s"},
-}
-
-
-def written(folder: Path, **changes: Any) -> Path:
-    path = folder / "bench.yaml"
-    path.write_text(yaml.safe_dump(SMALL | changes))
-    return path
+written = partial(write_bench, balls={"count": 200}, stop={"longest_time": "0.3 s"})
 
 
 @pytest.fixture
