@@ -3,9 +3,10 @@
     python pipeline/studies/mesh_study.py            # about two minutes on two cores
 
 Designs are drawn from the full recipe by the dataset's own functions; rock that yields in the wave
-front has a study of its own, `front_study.py`. Every setting is compared with a mesh of 1,152
-zones. Cost is counted, not timed: zones in motion summed over the steps. The tables and figures of
-`pipeline/docs/mesh_study.md` are written by this script, between its marks.
+front has a study of its own, `front_study.py`. Every setting is compared with the default mesh
+refined eight times everywhere. Cost is counted, not timed: zones in motion summed over the steps.
+The tables and figures of `pipeline/docs/mesh_study.md` are written by this script, between its
+marks.
 """
 
 from __future__ import annotations
@@ -25,15 +26,19 @@ from castblast.errors import Status
 from castblast.explosive.isentrope import pressure
 from castblast.nearfield.case import NearFieldSettings
 from castblast.nearfield.march import Annulus, March, march
-from castblast.nearfield.outcome import STATE_NAMES, WINDOW, end_state, mean_over
-from castblast.nearfield.setup import (
-    EQUILIBRIUM_RADII,
+from castblast.nearfield.mesh import (
+    EASING,
+    ELASTIC_SPLIT,
     EQUILIBRIUM_REACH,
     EQUILIBRIUM_WIDTH,
     EQUILIBRIUM_ZONES,
-    FRONT_REACH,
+    FRONT_SPLIT,
+    FRONT_WIDTH,
     FRONT_ZONES,
+    WALL_SPLIT,
 )
+from castblast.nearfield.outcome import STATE_NAMES, WINDOW, end_state, mean_over
+from castblast.nearfield.setup import EQUILIBRIUM_RADII
 from castblast.nearfield.solver import _annulus
 from castblast.report.style import CYCLE, GREY, in_style, new_figure, save_figure
 from castblast.types import FloatArray
@@ -42,7 +47,8 @@ Change: TypeAlias = Callable[[Annulus], Annulus]
 
 PAGE = ROOT / "pipeline/docs/mesh_study.md"
 STUDY_SEED, CHECK_SEED = 7, 99
-REFERENCE_ZONES, SECOND_ZONES = 1152, 576
+#: The default refined everywhere: the reference, and that of the check.
+FINEST, FINE = 8 * EQUILIBRIUM_ZONES, 4 * EQUILIBRIUM_ZONES
 #: Changes no number of the tables.
 _THREADS = 2
 #: Long runs for the end time: last windows, in units of the time at which the wall turns back.
@@ -65,10 +71,14 @@ LIMITS = {"pressure": 0.3, "hole radius": 0.1}
 
 
 class Setting(NamedTuple):
-    """One row of a table: what is changed, beginning from the default of the solver."""
+    """One row of a table: what is changed, beginning from the default of the solver.
+
+    `zones` : of rock whose front stays elastic, all meshes refined alike; 0: the default.
+    """
 
     label: str
     change: Change
+    zones: int = 0
 
 
 class Outcome(NamedTuple):
@@ -87,7 +97,7 @@ def annuli(cases: Sequence[BlastCase], zones: int = 0) -> list[Annulus]:
     ]
 
 
-def run_all(cases: Sequence[BlastCase], setting: Setting, zones: int = 0) -> Outcome:
+def run_all(cases: Sequence[BlastCase], setting: Setting) -> Outcome:
     """March all cases under a setting.
 
     Raises
@@ -108,7 +118,7 @@ def run_all(cases: Sequence[BlastCase], setting: Setting, zones: int = 0) -> Out
         return np.concatenate([targets, [run.zone_steps, run.steps, residual]])
 
     with ThreadPoolExecutor(_THREADS) as pool:
-        table = np.array(list(pool.map(one, zip(cases, annuli(cases, zones), strict=True))))
+        table = np.array(list(pool.map(one, zip(cases, annuli(cases, setting.zones), strict=True))))
     return Outcome(table[:, :-3], table[:, -3], table[:, -2], table[:, -1])
 
 
@@ -161,24 +171,17 @@ def keep(annulus: Annulus) -> Annulus:
     return annulus
 
 
-def with_mesh(zones: int, width: float = 1.0, reach: float = 1.0) -> Change:
-    """Other number of zones; factors on the width at the wall and on the reach."""
+def never_merged(annulus: Annulus) -> Annulus:
+    """Keep the zones of the front to the end."""
+    return annulus._replace(coarse=annulus.coarse._replace(first=0.0))
+
+
+def merging_to(factor: float) -> Change:
+    """Factor on the widths to which zones merge; the front stays as it is."""
 
     def change(a: Annulus) -> Annulus:
-        return a._replace(
-            zones=float(zones), first_width=a.first_width * width, reach=a.reach * reach
-        )
-
-    return change
-
-
-def uniform_width(zones: int, width: float) -> Change:
-    """Geometric mesh with the same width at the wall [hole radii] in every rock."""
-
-    def change(a: Annulus) -> Annulus:
-        return a._replace(
-            zones=float(zones), first_width=width * a.inner_radius, reach=float("inf")
-        )
+        c = a.coarse
+        return a._replace(coarse=c._replace(first=factor * c.first, growth=factor * c.growth))
 
     return change
 
@@ -241,18 +244,16 @@ def window_errors(cases: Sequence[BlastCase]) -> tuple[list[str], FloatArray]:
 
 
 @in_style
-def draw_cost(points: dict[str, list[tuple[float, float, float]]], path: Path) -> None:
+def draw_cost(points: Sequence[tuple[float, float, float]], path: Path) -> None:
     """95th percentile of the error over the cost, for pressure and hole radius."""
     figure, axes = new_figure(1, 2, width=8.0, height=3.0)
+    cost, *error = np.array(points).T
     for k, (target, limit) in enumerate(LIMITS.items()):
-        for (name, values), colour in zip(points.items(), CYCLE, strict=False):
-            cost, *error = np.array(values).T
-            axes[k].loglog(cost / 1e3, error[k], "o-", color=colour, label=name, markersize=4)
+        axes[k].loglog(cost / 1e3, error[k], "o-", color=CYCLE[0], markersize=4)
         axes[k].axhline(limit, color=GREY, linestyle="--", linewidth=1.0)
         axes[k].set_title(f"Error of the {target}")
         axes[k].set_xlabel("1000 zone-steps per case")
         axes[k].set_ylabel("95th percentile [%]")
-    axes[0].legend()
     save_figure(figure, path, dpi=110)
 
 
@@ -284,33 +285,21 @@ def study(
     cases: Sequence[BlastCase], checks: dict[str, list[BlastCase]], figures: Path
 ) -> dict[str, list[str]]:
     """Rock whose front stays elastic; tables by name."""
-    default = Setting("default", keep)
-    n = EQUILIBRIUM_ZONES
-    fine = run_all(cases, default, REFERENCE_ZONES)
-    second = run_all(cases, default, SECOND_ZONES)
-    counts = sorted({64, 80, 96, n, 128, 160, 2 * n, 288})
+    fine = run_all(cases, Setting("", keep, FINEST))
     blocks: dict[str, list[str]] = {"default": describe_default()}
+    counts = (36, 54, EQUILIBRIUM_ZONES, 108, 144, FINE)
     blocks["zones"], by_zones = table(
-        [Setting(_default_mark(z), with_mesh(z, n / z)) for z in counts], cases, fine.targets
+        [Setting(_default_mark(z), keep, z) for z in counts], cases, fine.targets
     )
-    blocks["zones"].append(row(f"{SECOND_ZONES} zones", second, fine.targets))
-    widths = ((96, 0.18), (128, 0.135), (144, 0.12), (192, 0.09), (288, 0.06))
-    plain = [Setting(f"{z} zones, {w:g}", uniform_width(z, w)) for z, w in widths]
-    blocks["geometric"], by_width = table(plain, cases, fine.targets)
     for name, settings in variations().items():
         blocks[name], _ = table(settings, cases, fine.targets)
     for name, others in checks.items():
-        reference = run_all(others, default, SECOND_ZONES).targets
+        reference = run_all(others, Setting("", keep, FINE)).targets
         lines, _ = table([Setting(f"{name}, {len(others)} designs", keep)], others, reference)
         blocks["check"] = blocks.get("check", lines[:2]) + lines[2:]
     blocks["window"], paths = window_errors([*cases, *checks["full"]])
-    draw_cost(
-        {
-            "default grading": [_point(o, fine.targets) for o in by_zones],
-            "geometric, same width in all rock": [_point(o, fine.targets) for o in by_width],
-        },
-        figures / "mesh_cost.png",
-    )
+    points = [_point(outcome, fine.targets) for outcome in by_zones]
+    draw_cost(points, figures / "mesh_cost.png")
     draw_paths(paths, figures / "mesh_window.png")
     return blocks
 
@@ -318,24 +307,26 @@ def study(
 def describe_default() -> list[str]:
     """Formula of the default mesh with the numbers of the solver."""
     return [
-        f"{EQUILIBRIUM_ZONES} zones to {EQUILIBRIUM_RADII:,.0f} hole radii, of the width",
+        f"{EQUILIBRIUM_ZONES} zones to {EQUILIBRIUM_RADII:,.0f} hole radii behind the front, of "
+        "the width",
         "",
         f"    (first + g y) (1 + y / {EQUILIBRIUM_REACH:g})",
         f"    first = {EQUILIBRIUM_WIDTH:g} (x^2 + 0.3^2)^(1/4) / (1 + (x / 6)^2)^(1/4)",
         "",
-        f"and in rock that yields in the wave front {FRONT_ZONES} zones, with {FRONT_REACH:g} in "
-        f"place of {EQUILIBRIUM_REACH:g}",
+        f"and {FRONT_ZONES} with {FRONT_WIDTH:g} in rock that yields in the wave front. In the "
+        f"front there are {WALL_SPLIT:g} zones for one at the wall, and far out {ELASTIC_SPLIT:g}, "
+        f"or {FRONT_SPLIT:g} where the rock yields in it; between I of {EASING[0]:g} and "
+        f"{EASING[1]:g} all of that passes over smoothly.",
     ]
 
 
 def variations() -> dict[str, list[Setting]]:
     """Settings that differ from the default in one thing, by table."""
-    n = EQUILIBRIUM_ZONES
-    factors = ((0.6, 1.0), (0.8, 1.0), (1.0, 1.0), (1.2, 1.0), (1.6, 1.0), (1.0, 0.4), (1.0, 3.0))
     viscosities = ((0.1, 1.5), (0.15, 1.5), (0.3, 1.5), (0.15, 0.75), (0.15, 3.0))
     return {
-        "grading": [
-            Setting(f"width x {w:g}, reach x {r:g}", with_mesh(n, w, r)) for w, r in factors
+        "merging": [
+            Setting("never merged", never_merged),
+            *(Setting(f"widths x {f:g}", merging_to(f)) for f in (0.5, 1.0, 2.0, 4.0)),
         ],
         "viscosity": [
             Setting(f"C_L {a:g}, C_Q {b:g}", with_viscosity(a, b)) for a, b in viscosities

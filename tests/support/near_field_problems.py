@@ -6,6 +6,7 @@ from castblast.explosive.isentrope import Explosive, jwl_isentrope
 from castblast.nearfield.case import Hole, NearFieldSettings, Rock
 from castblast.nearfield.march import Annulus, WallLoad
 from castblast.nearfield.rock.lagrangian import Material
+from castblast.nearfield.rock.merging import Coarse
 from castblast.nearfield.rock.mohr_coulomb import apex_tension, friction_number
 from castblast.nearfield.solver import NearFieldResult, solve_near_field
 
@@ -76,7 +77,8 @@ def annulus(
     return Annulus(
         material, float(friction_number(of.friction_angle)),
         float(friction_number(of.dilation_angle)), inner, outer, first, np.inf, float(zones),
-        in_situ, quiet, load, end, 1.8, courant, 5_000_000,
+        Coarse(first=0.0, growth=0.0, reach=1.0), in_situ, quiet, load, end, 1.8, courant,
+        5_000_000,
     )  # fmt: skip
 
 

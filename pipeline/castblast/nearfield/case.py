@@ -83,7 +83,8 @@ class NearFieldSettings(NamedTuple):
     outer_radius : float [m]
         0: 5.5 m in paper mode, 1000 hole radii in equilibrium mode.
     zones : int
-        0: the default of the mode, in equilibrium mode more in rock that yields in the wave front.
+        Equilibrium mode: of rock whose front stays elastic, behind the front of the wave; all
+        meshes are refined alike. 0: the default of the mode.
     quadratic_viscosity, linear_viscosity : float [-]
         See `castblast.nearfield.rock.lagrangian`; below a linear viscosity of 0.1 weak rock of high
         friction has no answer that converges. Rock that yields in the wave front has none of the

@@ -36,11 +36,13 @@ def front_number(
     return friction * poisson_ratio / (1.0 - poisson_ratio)
 
 
-def regularised_share(front: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Share of the regularising viscosity [-]: 0 where the front yields, 1 where it does not.
-
-    Twice continuously differentiable in the number I of the front.
-    """
-    low, high = PASSAGE
+def passage(front: NDArray[np.float64], ends: tuple[float, float]) -> NDArray[np.float64]:
+    """0 below, 1 above a passage, twice continuously differentiable in the number I between."""
+    low, high = ends
     x = np.clip((front - low) / (high - low), 0.0, 1.0)
     return np.asarray(x * x * x * (10.0 - x * (15.0 - 6.0 * x)))
+
+
+def regularised_share(front: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Share of the regularising viscosity [-]: 0 where the front yields, 1 where it does not."""
+    return passage(front, PASSAGE)

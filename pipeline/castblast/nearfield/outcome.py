@@ -111,11 +111,37 @@ def _outermost(values: FloatArray, threshold: float) -> int:
 
 
 @kernel
-def _between(nodes: FloatArray, j: int, share: float) -> float:
+def _between(nodes: FloatArray, j: int, share: float, power: float) -> float:
     """Radius [m] at a share of the way from the centre of zone `j` to the next, logarithmically."""
-    centre = np.log(0.5 * (nodes[j] + nodes[j + 1]))
-    following = np.log(0.5 * (nodes[j + 1] + nodes[j + 2]))
+    centre = np.log(_centre(nodes[j], nodes[j + 1], power))
+    following = np.log(_centre(nodes[j + 1], nodes[j + 2], power))
     return float(np.exp(centre + share * (following - centre)))
+
+
+@kernel
+def _centre(inner: float, outer: float, power: float) -> float:
+    """Radius [m] at which what goes as a power of the radius has its mean over the area of a zone.
+
+    In a wide zone the middle would be too far out for a strain that falls with the radius.
+    """
+    ratio, order = outer / inner, power + 2.0
+    if abs(power) < 1e-3:
+        return 0.5 * (inner + outer)
+    total = np.log(ratio) if abs(order) < 1e-6 else (ratio**order - 1.0) / order
+    return float(inner * (total / (0.5 * (ratio * ratio - 1.0))) ** (1.0 / power))
+
+
+@kernel
+def _power(nodes: FloatArray, j: int, ratio: float) -> float:
+    """Power of the radius by which zone means fall to a `ratio` from zone `j` to the next."""
+    power = -2.0
+    for _ in range(3):
+        inside, outside = (
+            _centre(nodes[j], nodes[j + 1], power),
+            _centre(nodes[j + 1], nodes[j + 2], power),
+        )
+        power = min(-1e-2, max(-20.0, np.log(ratio) / np.log(outside / inside)))
+    return power
 
 
 @kernel
@@ -139,8 +165,27 @@ def threshold_radius(nodes: FloatArray, strain: FloatArray, threshold: float) ->
         return float(nodes[0])
     if j == strain.size - 1:
         return float(nodes[j + 1])
-    inside, outside = np.log(strain[j]), np.log(max(strain[j + 1], 1e-9 * threshold))
-    return _between(nodes, j, (inside - np.log(threshold)) / (inside - outside))
+    ratio = max(strain[j + 1], 1e-9 * threshold) / strain[j]
+    share = np.log(threshold / strain[j]) / np.log(ratio)
+    return _between(nodes, j, share, _power(nodes, j, ratio))
+
+
+@kernel
+def steep_radius(nodes: FloatArray, strain: FloatArray, threshold: float) -> float:
+    """As `threshold_radius`, from three zones: near the wall strain is no power of the radius."""
+    j = _outermost(strain, threshold)
+    first = max(j - 1, 0)
+    if j < 0 or first + 2 >= strain.size or strain[first + 2] < 1e-2 * threshold:
+        return threshold_radius(nodes, strain, threshold)
+    power = _power(nodes, j, strain[j + 1] / strain[j])
+    wanted, place = np.log(threshold), 0.0
+    for a in range(first, first + 3):
+        weight = 1.0
+        for b in range(first, first + 3):
+            if b != a:
+                weight *= (wanted - np.log(strain[b])) / np.log(strain[a] / strain[b])
+        place += weight * np.log(_centre(nodes[a], nodes[a + 1], power))
+    return float(np.exp(place))
 
 
 @kernel
@@ -157,7 +202,7 @@ def yield_radius(nodes: FloatArray, multiplier: FloatArray) -> float:
     if j == multiplier.size - 1:
         return float(nodes[j + 1])
     inside = multiplier[j] - YIELD_STRAIN
-    return _between(nodes, j, inside / (multiplier[j] - multiplier[j + 1]))
+    return _between(nodes, j, inside / (multiplier[j] - multiplier[j + 1]), 0.0)
 
 
 @kernel
@@ -169,7 +214,7 @@ def damage_radii(body: Body) -> tuple[float, float, float, float, float]:
         yield_radius(nodes, body.shear_multiplier),
         yield_radius(nodes, body.hoop_multiplier),
         yield_radius(nodes, body.tensile_multiplier),
-        threshold_radius(nodes, body.shear_strain, INTENSE_STRAIN),
+        steep_radius(nodes, body.shear_strain, INTENSE_STRAIN),
     )
 
 

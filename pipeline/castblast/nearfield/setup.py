@@ -24,8 +24,10 @@ from castblast.nearfield.case import (
 )
 from castblast.nearfield.front import front_number, regularised_share
 from castblast.nearfield.march import Annulus, WallLoad
+from castblast.nearfield.mesh import Mesh, equilibrium_mesh, paper_mesh
 from castblast.nearfield.outcome import WINDOW
 from castblast.nearfield.rock.lagrangian import Material
+from castblast.nearfield.rock.merging import Coarse
 from castblast.nearfield.rock.mohr_coulomb import apex_tension, friction_number
 
 #: Outer radius of the published model [m].
@@ -35,17 +37,6 @@ PAPER_END = 0.9
 #: Outer radius of the equilibrium mode in hole radii. Zones that no wave has reached cost nothing;
 #: only in the weakest dilatant rock does anything beyond 250 hole radii matter.
 EQUILIBRIUM_RADII = 1000.0
-#: Zones of the two modes, and width of those at the wall in hole radii at that number of zones;
-#: in equilibrium mode it is the factor of `_wall_width`.
-PAPER_ZONES, PAPER_WIDTH = 256, 0.04
-EQUILIBRIUM_ZONES, EQUILIBRIUM_WIDTH = 112, 0.2325
-#: Distance from the wall, in hole radii, over which the mesh of the equilibrium mode stays fine.
-EQUILIBRIUM_REACH = 100.0
-#: Zones and reach of the equilibrium mode in rock that yields in the wave front, which has to stay
-#: sharp on all of its way. The zones at the wall, which set the step, are no narrower for it.
-FRONT_ZONES, FRONT_REACH = 288, 250.0
-#: Share of the largest stable step.
-COURANT = 0.85
 MAX_STEPS = 300_000
 _MOST_DECOUPLED = 100.0
 
@@ -65,9 +56,7 @@ class HoleParameters(NamedTuple):
     dilation: FloatArray
     inner_radius: FloatArray
     outer_radius: FloatArray
-    first_width: FloatArray
-    reach: FloatArray
-    zones: FloatArray
+    mesh: Mesh
     linear_viscosity: FloatArray
     in_situ_stress: FloatArray
     charge_radius: FloatArray
@@ -128,23 +117,34 @@ def hole_parameters(
     if settings.outer_radius == 0.0:
         outer = np.full_like(inner, PAPER_RADIUS) if paper else EQUILIBRIUM_RADII * inner
     wave_speed = np.sqrt((bulk + 4.0 / 3.0 * shear) / c.density)
-    share = regularised_share(front_number(friction, c.poisson_ratio))
-    usual = PAPER_ZONES if paper else EQUILIBRIUM_ZONES
-    default = usual if paper else FRONT_ZONES + share * (EQUILIBRIUM_ZONES - FRONT_ZONES)
-    zones = np.full_like(inner, settings.zones if settings.zones else default)
-    # More zones than the default refine it everywhere alike; those that rock which yields in the
-    # front has beyond the usual number go to the front, and are the first to be missing.
-    coarse = np.maximum(np.minimum(default / zones, 1.0), usual / zones)
-    width = PAPER_WIDTH if paper else _wall_width(wave_speed * c.rise_time / inner)
-    reach = FRONT_REACH + share * (EQUILIBRIUM_REACH - FRONT_REACH)
-    reach = np.full_like(inner, np.inf) if paper else reach * inner
+    front = front_number(friction, c.poisson_ratio)
+    share = regularised_share(front)
+    run = wave_speed * c.rise_time / inner
+    mesh = (
+        paper_mesh(inner, settings.zones)
+        if paper
+        else equilibrium_mesh(inner, outer, run, front, settings.zones)
+    )
     end = PAPER_END * (outer - inner) / wave_speed if paper else np.zeros_like(inner)
     energies = np.array([e.total_energy for e in explosives])
     return HoleParameters(
-        c.density, bulk, shear, c.ucs, tension, friction, friction_number(c.dilation_angle), inner,
-        outer, width * inner * coarse, reach, zones, share * settings.linear_viscosity,
-        c.in_situ_stress, 0.5 * c.charge_diameter, c.rise_time, end, energies[c.explosive],
-    )  # fmt: skip
+        density=c.density,
+        bulk_modulus=bulk,
+        shear_modulus=shear,
+        ucs=c.ucs,
+        tension=tension,
+        friction=friction,
+        dilation=friction_number(c.dilation_angle),
+        inner_radius=inner,
+        outer_radius=outer,
+        mesh=mesh,
+        linear_viscosity=share * settings.linear_viscosity,
+        in_situ_stress=c.in_situ_stress,
+        charge_radius=0.5 * c.charge_diameter,
+        rise_time=c.rise_time,
+        end_time=end,
+        total_energy=energies[c.explosive],
+    )
 
 
 def common_parameters(settings: NearFieldSettings) -> CommonParameters:
@@ -152,18 +152,6 @@ def common_parameters(settings: NearFieldSettings) -> CommonParameters:
     return CommonParameters(
         bool(settings.tension == TensionMode.BRITTLE),
         float(settings.quadratic_viscosity),
-    )
-
-
-def _wall_width(run: FloatArray) -> FloatArray:
-    """Width of the zones at the wall [hole radii] in equilibrium mode.
-
-    `run` is how far the p-wave travels while the load rises [hole radii]. What a coarse zone at
-    the wall gets wrong is the work during the rise; the longer the wave, the wider it may be. A
-    smooth function, so that the mesh adds no kink to the targets. See the mesh study.
-    """
-    return np.asarray(
-        EQUILIBRIUM_WIDTH * (run * run + 0.3**2) ** 0.25 / (1.0 + (run / 6.0) ** 2) ** 0.25
     )
 
 
@@ -178,9 +166,18 @@ def make_annulus(
         common.brittle, common.quadratic_viscosity, h.linear_viscosity[row],
     )  # fmt: skip
     in_situ = h.in_situ_stress[row]
-    load = WallLoad(True, isentrope, h.charge_radius[row], in_situ, 0.0, h.rise_time[row])
+    load = WallLoad(
+        gas=True, isentrope=isentrope, charge_radius=h.charge_radius[row], start_pressure=in_situ,
+        target_pressure=0.0, rise_time=h.rise_time[row],
+    )  # fmt: skip
+    m = h.mesh
+    inner, outer = h.inner_radius[row], h.outer_radius[row]
     return Annulus(
-        material, h.friction[row], h.dilation[row], h.inner_radius[row], h.outer_radius[row],
-        h.first_width[row], h.reach[row], h.zones[row], in_situ, True, load, h.end_time[row],
-        WINDOW[1], COURANT, MAX_STEPS,
+        material=material, friction=h.friction[row], dilation=h.dilation[row], inner_radius=inner,
+        outer_radius=outer, first_width=m.first_width[row], reach=m.reach[row], zones=m.zones[row],
+        coarse=Coarse(
+            first=m.coarse_width[row], growth=m.coarse_growth[row], reach=m.coarse_reach[row]
+        ),
+        in_situ_stress=in_situ, quiet=True, load=load, end_time=h.end_time[row],
+        settling_factor=WINDOW[1], courant=m.courant[row], max_steps=MAX_STEPS,
     )  # fmt: skip

@@ -18,11 +18,10 @@ keeps growing and the pressure falls slowly after the window: by less than 0.5 p
 doubling of the time in weak rock, by 1 to 5 percent in strong rock. The window is then part of
 the definition (with a tensile strength of UCS / 12 the pressure stays within 0.2 percent).
 
-**Measured** (derived by this project, 95th percentile): in rock whose wave front stays elastic, 32
-designs against 1,152 zones, pressure 0.13 percent, hole radius 0.032, crushed-zone radius 0.13, gas
-work 0.93. In rock that yields in the front, 160 designs against 2,400 zones, pressure 1.2 percent
-and hole radius 0.31; 0.47 and 0.14 against 1,000 zones with next to no viscosity, which are not
-converged to that themselves. Energy ledger below 8e-4. See `pipeline/docs/mesh_study.md`.
+**Measured** (derived by this project, 95th percentile): in rock whose wave front stays elastic, 120
+designs against a converged mesh, pressure 0.08 percent, hole radius 0.02, gas work 0.03. In rock
+that yields in the front, 160 designs, pressure 0.46 percent and hole radius 0.14. Energy ledger
+below 9e-4. See `pipeline/docs/mesh_study.md`.
 """
 
 from __future__ import annotations

@@ -81,8 +81,9 @@ LIMITS = {
 }
 #: Sweeps along which the solution itself bends, and the factor on the limit at every fifth point.
 #: Weak rock begins to yield in the wave front near 36 degrees (I of 0.92). The mesh does not make
-#: that: the jump of the pressure is 1.2e-3 by default, 1.7e-3 on 448 and 1.8e-3 on 900 zones.
-BENDS = {("weak", "friction_angle"): 2.0}
+#: that: on 2, 4 and 8 times the zones the jump of the pressure is 2.6e-3, 5.1e-3 and 5.8e-3, that
+#: of the radius 9e-4, 1.8e-3 and 2.1e-3; by default 2.5e-3 and 8e-4.
+BENDS = {("weak", "friction_angle"): 3.0}
 #: Radii of any yield at all: the edge of a zone of next to no plastic strain, rough by nature.
 YIELD_RADII = ("plastic_zone_radius", "hoop_crushed_radius")
 

@@ -12,16 +12,17 @@ from castblast.explosive.isentrope import pressure, tabulated_isentrope
 from castblast.nearfield import march as march_module
 from castblast.nearfield import solver
 from castblast.nearfield.case import EndMode, Hole, NearFieldSettings
+from castblast.nearfield.mesh import EQUILIBRIUM_ZONES
 from castblast.nearfield.outcome import (
     STATE_NAMES,
     end_state,
     histories,
     last_time_outside,
     mean_over,
+    steep_radius,
     threshold_radius,
     yield_radius,
 )
-from castblast.nearfield.setup import EQUILIBRIUM_ZONES
 from castblast.nearfield.solver import NearFieldResult, solve_near_field
 
 
@@ -156,14 +157,31 @@ def test_equilibrium_time_is_the_last_time_outside_one_percent() -> None:
     assert result.equilibrium_time == pytest.approx(last, abs=2.0 * result.end_time / 2000.0)
 
 
-def test_threshold_radius_follows_a_power_law_between_zone_centres() -> None:
-    nodes = np.geomspace(1.0, 100.0, 41)
-    centre = 0.5 * (nodes[1:] + nodes[:-1])
+def test_threshold_radius_follows_a_power_law_of_zone_means() -> None:
+    """What a zone holds is the mean over its area, in zones as wide as a third of their radius."""
+    nodes = np.geomspace(1.0, 100.0, 17)
+    area = 0.5 * np.diff(nodes**2)
     for wanted in (2.0, 7.3, 31.0):
-        strain = 0.01 * (wanted / centre) ** 2.5
-        assert threshold_radius(nodes, strain, 0.01) == pytest.approx(wanted, rel=1e-12)
-    assert threshold_radius(nodes, np.full(40, 0.001), 0.01) == 1.0
-    assert threshold_radius(nodes, np.ones(40), 0.01) == 100.0
+        for power in (-3.5, -2.5, -1.2):
+            order = power + 2.0
+            mean = 0.01 * wanted**-power * np.diff(nodes**order) / order / area
+            assert threshold_radius(nodes, mean, 0.01) == pytest.approx(wanted, rel=1e-6)
+            assert steep_radius(nodes, mean, 0.01) == pytest.approx(wanted, rel=1e-6)
+    assert threshold_radius(nodes, np.full(16, 0.001), 0.01) == 1.0
+    assert threshold_radius(nodes, np.ones(16), 0.01) == 100.0
+
+
+def test_steep_radius_follows_what_is_no_power_of_the_radius() -> None:
+    """Three zones see the bend of a strain near the wall, which two do not."""
+    nodes = np.geomspace(1.0, 10.0, 24)
+    radius = np.linspace(1.0, 10.0, 2_000_001)
+    strain = 0.05 * radius**-2.0 * np.exp(-0.3 * (radius - 1.0))
+    zone = np.clip(np.searchsorted(nodes, radius, side="right") - 1, 0, 22)
+    mean = np.bincount(zone, strain * radius) / np.bincount(zone, radius)
+    wanted = np.interp(-0.01, -strain, radius)
+    two, three = (f(nodes, mean, 0.01) / wanted - 1.0 for f in (threshold_radius, steep_radius))
+    assert abs(three) < 2e-4
+    assert abs(three) < 0.6 * abs(two)
 
 
 def test_yield_radius_moves_continuously_from_zone_to_zone() -> None:

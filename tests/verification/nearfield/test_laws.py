@@ -136,12 +136,12 @@ def test_settled_state_converges_in_the_weakest_rock() -> None:
 
 
 def test_without_linear_viscosity_refinement_makes_it_worse() -> None:
-    """Weak rock of high friction: the answer wanders with the mesh, to 2.8 percent and more.
+    """Weak rock of high friction: the answer wanders with the mesh, by 4 percent.
 
     That there is one mesh-independent answer takes a viscosity over a physical length.
     """
     weak = rock(friction_angle=53.0, ucs=1.1e7, young_modulus=2.4e10)
-    meshes = (144, 288, 576)
+    meshes = (72, 144, 288)
     bare = [blast(of=weak, zones=n, linear_viscosity=0.0).equilibrium_pressure for n in meshes]
     assert max(bare) / min(bare) > 1.01
     usual = [blast(of=weak, zones=n).equilibrium_pressure for n in meshes]

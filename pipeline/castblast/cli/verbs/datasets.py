@@ -17,7 +17,7 @@ app = typer.Typer(
 _Dataset = Annotated[Path, typer.Argument(help="Dataset (netCDF).")]
 
 
-@verb(app, needs=("simulate", "data"), example="dataset check data/paper/1.2.0/data.nc")
+@verb(app, needs=("simulate", "data"), example="dataset check data/paper/1.3.0/data.nc")
 def check(screen: Screen, dataset: _Dataset) -> Mapping[str, Any]:
     """Check a dataset against the format and report all faults (exit code 4 if any)."""
     from castblast.stages.datasets.dataset import check_dataset
@@ -33,7 +33,7 @@ def check(screen: Screen, dataset: _Dataset) -> Mapping[str, Any]:
     return {"dataset": str(dataset), "faults": faults}
 
 
-@verb(app, needs=("simulate", "data"), example="dataset describe data/paper/1.2.0/data.nc")
+@verb(app, needs=("simulate", "data"), example="dataset describe data/paper/1.3.0/data.nc")
 def describe(screen: Screen, dataset: _Dataset) -> Mapping[str, Any]:
     """Summarise a dataset: size, ranges, failures, versions."""
     from castblast.stages.datasets.dataset import describe_dataset
@@ -45,7 +45,7 @@ def describe(screen: Screen, dataset: _Dataset) -> Mapping[str, Any]:
     app,
     needs=("simulate", "data"),
     compiles="nearfield",
-    example="dataset reproduce data/paper/1.2.0/data.nc --sample 7",
+    example="dataset reproduce data/paper/1.3.0/data.nc --sample 7",
 )
 def reproduce(
     screen: Screen,
@@ -62,7 +62,7 @@ def reproduce(
     app,
     needs=("simulate", "data"),
     compiles="nearfield",
-    example="dataset extend data/paper/1.2.0/data.nc --design next.csv",
+    example="dataset extend data/paper/1.3.0/data.nc --design next.csv",
 )
 def extend(
     screen: Screen,
@@ -106,7 +106,7 @@ def extend(
 @verb(
     app,
     needs=("simulate", "data"),
-    example="dataset diff data/paper/1.1.0/data.nc data/paper/1.2.0/data.nc",
+    example="dataset diff data/paper/1.1.0/data.nc data/paper/1.3.0/data.nc",
 )
 def diff(
     screen: Screen,
@@ -127,7 +127,7 @@ def diff(
 @verb(
     app,
     needs=("simulate", "data"),
-    example="dataset export data/paper/1.2.0/data.nc --to csv,parquet",
+    example="dataset export data/paper/1.3.0/data.nc --to csv,parquet",
 )
 def export(
     screen: Screen,

@@ -37,5 +37,5 @@ def add_to(app: typer.Typer) -> None:
         needs=("simulate", "data", "train"),
         compiles="nearfield",
         panel=DATA,
-        example="infill data/paper/1.2.0/data.nc levenberg --rows 500",
+        example="infill data/paper/1.3.0/data.nc levenberg --rows 500",
     )(infill)

@@ -224,11 +224,11 @@ def _is_tracked(screen: Screen, wanted: bool | None) -> bool:
 def add_to(app: typer.Typer) -> None:
     """Register the verbs."""
     examples: dict[Verb, str] = {
-        train: "train data/paper/1.2.0/data.nc levenberg",
-        tune: "tune data/paper/1.2.0/data.nc torch_mlp --trials 40",
-        compare: "compare data/paper/1.2.0/data.nc --quick",
+        train: "train data/paper/1.3.0/data.nc levenberg",
+        tune: "tune data/paper/1.3.0/data.nc torch_mlp --trials 40",
+        compare: "compare data/paper/1.3.0/data.nc --quick",
         runs: "runs --stage compare --sort valid_error",
-        export: "export data/paper/1.2.0/comparison --to json,c",
+        export: "export data/paper/1.3.0/comparison --to json,c",
     }
     for function, example in examples.items():
         verb(app, panel=MODELS, example=example)(function)

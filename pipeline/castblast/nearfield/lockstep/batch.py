@@ -16,7 +16,8 @@ from castblast.errors import Status
 from castblast.explosive.isentrope import Explosive
 from castblast.explosive.packed import pack_isentropes
 from castblast.nearfield.case import FloatArray, IntArray, NearFieldColumns, NearFieldSettings
-from castblast.nearfield.lockstep.lane_march import Cases, march_many
+from castblast.nearfield.lockstep.lane_march import march_many
+from castblast.nearfield.lockstep.state import Cases
 from castblast.nearfield.outcome import STATE_NAMES, no_state
 from castblast.nearfield.setup import (
     MAX_STEPS,
@@ -107,7 +108,9 @@ def solve_near_fields(
         )
         rows = np.flatnonzero(good)
         # Lanes with as many zones run together: all lanes wait for the one with the most.
-        order = np.lexsort((-_expected_steps(holes)[rows], -np.round(holes.zones[rows] / 16.0)))
+        order = np.lexsort(
+            (-_expected_steps(holes)[rows], -np.round(holes.mesh.zones[rows] / 16.0))
+        )
         march_many(cases, rows[order], MAX_STEPS, states, points)
     return _batch(states, points)
 

@@ -7,26 +7,20 @@ cases are taken in the order given; with the longest first, few lanes idle at th
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from castblast.explosive.packed import PackedIsentropes, packed_pressure, unpack_isentrope
-from castblast.kernel import inline_kernel, kernel, lean_kernel
-from castblast.nearfield.clock import (
-    Clock,
-    Schedule,
-    after_step,
-    is_last,
-    last_step,
-    load_work,
-)
+from castblast.explosive.packed import packed_pressure
+from castblast.kernel import kernel, lean_kernel
+from castblast.nearfield.clock import Clock, Schedule, after_step, is_last, last_step, load_work
 from castblast.nearfield.lockstep.lanes import (
     ACTIVE,
+    AREA,
     BLOCK,
+    DENSITY,
     FASTEST,
     FORCE,
     KICK,
+    KICKED,
     LANES,
     LAST,
     LIMIT,
@@ -34,24 +28,39 @@ from castblast.nearfield.lockstep.lanes import (
     RADIUS,
     SHEAR_WORK,
     STEP,
+    STIFFNESS,
     TENSILE_WORK,
     VELOCITY,
     VISCOUS_WORK,
-    EdgeModels,
     clear_lane,
     kick_and_move,
-    lane_array_sizes,
     load_lane,
     unload_lane,
     update_lanes,
+)
+from castblast.nearfield.lockstep.merging import load_at_rest, merge_lane
+from castblast.nearfield.lockstep.state import (
+    IDLE,
+    Cases,
+    Lanes,
+    annulus,
+    clock_of,
+    coarse_of,
+    make_lanes,
+    rest_of,
+    set_clock,
+    with_blocks,
 )
 from castblast.nearfield.march import (
     AT_REST,
     NOT_CONVERGED,
     OK,
-    Annulus,
     March,
     kick_boundary,
+    kick_of,
+    lost_to_growth,
+    merges_after,
+    passed_by,
     prepare,
     schedule_of,
     status_after,
@@ -66,123 +75,35 @@ from castblast.nearfield.rock.lagrangian import (
     TENSION,
     VISCOUS,
     FloatArray,
+    make_body,
     step_limit,
 )
-from castblast.nearfield.rock.mohr_coulomb import IntArray
-from castblast.nearfield.setup import CommonParameters, HoleParameters, make_annulus
+from castblast.nearfield.rock.merging import node_mass
+from castblast.nearfield.rock.mohr_coulomb import IntArray, make_yield_model
 
-_IDLE = -1
-
-
-class Lanes(NamedTuple):
-    """State of all lanes.
-
-    Attributes
-    ----------
-    zones, rows : array
-        See `castblast.nearfield.lockstep.lanes`.
-    edges : EdgeModels
-    case, active, steps, zone_steps, fallbacks, status : int array (LANES,)
-        Row of the case (-1: idle), zones in motion, steps taken, zones in motion summed over
-        them, failed returns, outcome so far.
-    finishing : bool array (LANES,)
-        The step at hand is the last one.
-    clock : array (LANES, 8)
-        Fields of `Clock`.
-    schedule : array (LANES, 4)
-        Fields of `Schedule`.
-    charge_radius, inner_mass, outer_mass, old_radius, peak : array (LANES,) [m, kg, kg, m, m/s]
-        `old_radius` is that of the wall before the step, `peak` its highest speed so far.
-    work : array (LANES, 3) [J/m per radian]
-        Boundary, load, ramp.
-    """
-
-    zones: FloatArray
-    rows: FloatArray
-    edges: EdgeModels
-    case: IntArray
-    active: IntArray
-    steps: IntArray
-    zone_steps: IntArray
-    fallbacks: IntArray
-    status: IntArray
-    finishing: IntArray
-    clock: FloatArray
-    schedule: FloatArray
-    charge_radius: FloatArray
-    inner_mass: FloatArray
-    outer_mass: FloatArray
-    old_radius: FloatArray
-    peak: FloatArray
-    work: FloatArray
-
-
-class Cases(NamedTuple):
-    """All cases of a batch.
-
-    Attributes
-    ----------
-    isentropes : PackedIsentropes
-    explosive : int array (n,)
-    holes : HoleParameters
-    common : CommonParameters
-    """
-
-    isentropes: PackedIsentropes
-    explosive: IntArray
-    holes: HoleParameters
-    common: CommonParameters
-
-
-@kernel
-def _annulus(cases: Cases, row: int) -> Annulus:
-    isentrope = unpack_isentrope(cases.isentropes, cases.explosive[row])
-    return make_annulus(cases.holes, row, cases.common, isentrope)
-
-
-@kernel
-def _make_lanes(zones: int) -> Lanes:
-    """All lanes, idle."""
-    zone_size, row_size = lane_array_sizes(zones)
-    state = Lanes(
-        np.zeros(zone_size), np.zeros(row_size),
-        EdgeModels(np.zeros((LANES, 11), np.int64), np.zeros((LANES, 11, 3, 3))),
-        np.full(LANES, _IDLE), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64),
-        np.zeros(LANES, np.int64),
-        np.zeros(LANES, np.int64), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64),
-        np.zeros((LANES, 8)), np.zeros((LANES, 4)), np.ones(LANES), np.ones(LANES),
-        np.ones(LANES), np.zeros(LANES), np.zeros(LANES), np.zeros((LANES, 3)),
-    )  # fmt: skip
-    for lane in range(LANES):
-        clear_lane(state.zones, state.rows, lane)
-    return state
-
-
-@inline_kernel
-def _clock(state: Lanes, lane: int) -> Clock:
-    c = state.clock
-    return Clock(
-        c[lane, 0], c[lane, 1], c[lane, 2], c[lane, 3], c[lane, 4], c[lane, 5], c[lane, 6],
-        c[lane, 7],
-    )  # fmt: skip
-
-
-@inline_kernel
-def _set_clock(state: Lanes, lane: int, clock: Clock) -> None:
-    for k in range(len(clock)):
-        state.clock[lane, k] = clock[k]
+#: Zones in motion for which there is room at first.
+_BLOCKS = 160
 
 
 @kernel
 def _start(state: Lanes, cases: Cases, lane: int, row: int, record: FloatArray) -> None:
     """Put a case into a lane."""
-    case = _annulus(cases, row)
+    case = annulus(cases, row)
     body, model, _, clock, active = prepare(case)
-    load_lane(state.zones, state.rows, state.edges, lane, body, case.material, model)
+    last = body.width.size
+    ready = min(active + 1, last)
+    load_lane(state.zones, state.rows, state.edges, lane, body, case.material, model, ready)
+    for j in range(last + 1):
+        state.nodes[lane, j], state.origin[lane, j] = body.initial_radius[j], j
+    state.rest[lane, 0], state.rest[lane, 1] = body.radial[last - 1], body.tension[last - 1]
+    state.rest[lane, 2] = body.shear_multiplier[last - 1]
+    state.rest[lane, 3] = body.tensile_multiplier[last - 1]
+    for k in range(len(case.coarse)):
+        state.coarse[lane, k] = case.coarse[k]
     state.case[lane], state.active[lane] = row, active
     state.steps[lane] = state.zone_steps[lane] = state.fallbacks[lane] = 0
     state.finishing[lane] = 0
-    _set_clock(state, lane, clock)
+    set_clock(state, lane, clock)
     schedule = schedule_of(case)
     for k in range(len(schedule)):
         state.schedule[lane, k] = schedule[k]
@@ -202,28 +123,31 @@ def _begin_step(state: Lanes) -> None:
     for lane in range(LANES):
         rows[LIMIT + lane] = np.inf
         rows[FASTEST + lane] = 0.0
-        if state.case[lane] == _IDLE:
+        if state.case[lane] == IDLE:
             continue
-        clock = _clock(state, lane)
+        clock = clock_of(state, lane)
         if is_last(clock):
             clock = last_step(clock)
             state.finishing[lane] = 1
             state.clock[lane, 1] = clock.step
         rows[STEP + lane] = clock.step
-        rows[KICK + lane] = 0.5 * (clock.previous_step + clock.step)
+        rows[KICK + lane] = kick_of(clock)
+        rows[KICKED + lane] = 0.0
         rows[PER_SECOND + lane] = 1.0 / clock.step
         rows[ACTIVE + lane] = state.active[lane]
         state.old_radius[lane] = state.zones[RADIUS + lane]
 
 
-@lean_kernel
+@kernel
 def _after_kick(state: Lanes, cases: Cases) -> int:
     """Let the waves reach their next zone and move outermost nodes; highest number of zones."""
     zones = state.zones
     most = 0
     for lane in range(LANES):
-        if state.case[lane] == _IDLE:
+        if state.case[lane] == IDLE:
             continue
+        spent = state.rows[KICKED + lane]
+        state.rows[VISCOUS_WORK + lane] += lost_to_growth(clock_of(state, lane), spent)
         active, last = state.active[lane], int(state.rows[LAST + lane])
         if active == last:
             _move_boundary(state, cases, lane)
@@ -233,6 +157,10 @@ def _after_kick(state: Lanes, cases: Cases) -> int:
             active += 1
             state.active[lane] = active
             state.rows[ACTIVE + lane] = active
+            if active < last:
+                load_at_rest(
+                    zones, state.rows, lane, active, state.nodes[lane], rest_of(state, lane)
+                )
         state.zone_steps[lane] += active
         most = max(most, active)
     return most
@@ -242,7 +170,7 @@ def _after_kick(state: Lanes, cases: Cases) -> int:
 def _move_boundary(state: Lanes, cases: Cases, lane: int) -> None:
     """Kick and move the outermost node of a lane whose wave has arrived there."""
     zones, rows = state.zones, state.rows
-    case = _annulus(cases, state.case[lane])
+    case = annulus(cases, state.case[lane])
     here = state.active[lane] * BLOCK + lane
     velocity, spent = kick_boundary(
         case, rows[KICK + lane], zones[here + RADIUS], case.outer_radius, zones[here + VELOCITY],
@@ -256,7 +184,7 @@ def _move_boundary(state: Lanes, cases: Cases, lane: int) -> None:
 @kernel
 def _status(cases: Cases, row: int, clock: Clock, limit: float, radius: float) -> int:
     """Status after a step of a case."""
-    return status_after(_annulus(cases, row).load, clock, limit, radius)
+    return status_after(annulus(cases, row).load, clock, limit, radius)
 
 
 @lean_kernel
@@ -267,9 +195,9 @@ def _finish_step(state: Lanes, cases: Cases, record: FloatArray) -> int:
     done = 0
     for lane in range(LANES):
         row = state.case[lane]
-        if row == _IDLE:
+        if row == IDLE:
             continue
-        before = _clock(state, lane)
+        before = clock_of(state, lane)
         limit = step_limit(rows[LIMIT + lane], rows[FASTEST + lane], before.step)
         radius = zones[RADIUS + lane]
         ratio = radius / state.charge_radius[lane]
@@ -284,7 +212,7 @@ def _finish_step(state: Lanes, cases: Cases, record: FloatArray) -> int:
         work, ramp = load_work(before, clock, state.old_radius[lane], radius)
         state.work[lane, 1] += work
         state.work[lane, 2] += ramp
-        _set_clock(state, lane, clock)
+        set_clock(state, lane, clock)
         steps = state.steps[lane] + 1
         state.steps[lane] = steps
         record[lane, steps, 0] = clock.time
@@ -306,16 +234,21 @@ def _retire(
 ) -> None:
     """Read the end state of a lane and leave it idle."""
     row = state.case[lane]
-    case = _annulus(cases, row)
-    body = prepare(case)[0]
-    unload_lane(state.zones, lane, body)
+    case = annulus(cases, row)
+    material = case.material
+    model = make_yield_model(
+        material.bulk_modulus, material.shear_modulus, case.friction, case.dilation
+    )
+    count = int(state.rows[LAST + lane])
+    body = make_body(state.nodes[lane, : count + 1], material, model, case.in_situ_stress)
+    unload_lane(state.zones, lane, state.active[lane], body)
     work = np.zeros(LEDGER_SIZE)
     work[SHEAR] = state.rows[SHEAR_WORK + lane]
     work[TENSION] = state.rows[TENSILE_WORK + lane]
     work[VISCOUS] = state.rows[VISCOUS_WORK + lane]
     work[BOUNDARY], work[LOAD] = state.work[lane, 0], state.work[lane, 1]
     work[RAMP] = state.work[lane, 2]
-    clock = _clock(state, lane)
+    clock = clock_of(state, lane)
     run = March(
         state.status[lane], body, record[lane, : state.steps[lane] + 1], work, clock.reversal,
         clock.speed, 0.5 * clock.previous_step, state.active[lane], state.steps[lane],
@@ -324,8 +257,35 @@ def _retire(
     end_state(case, run, cases.holes.total_energy[row], out[row])
     if run.status == OK:
         histories(run.record, points[row])
-    state.case[lane] = _IDLE
+    state.case[lane] = IDLE
     clear_lane(state.zones, state.rows, lane)
+
+
+@kernel
+def _merge(state: Lanes, lane: int) -> None:
+    """Merge the zones of a lane that may."""
+    zones, rows = state.zones, state.rows
+    clock, stiffness = clock_of(state, lane), rows[STIFFNESS + lane]
+    nodes = state.nodes[lane]
+    active = merge_lane(
+        zones, rows, lane, state.active[lane], nodes, state.origin[lane], rest_of(state, lane),
+        coarse_of(state, lane),
+        passed_by(
+            nodes[0], stiffness, rows[DENSITY + lane], clock, state.schedule[lane, 1]
+        ),
+        0.5 * clock.previous_step, clock.pressure * zones[RADIUS + lane],
+    )  # fmt: skip
+    state.active[lane] = active
+    state.inner_mass[lane] = node_mass(rows[DENSITY + lane], 0.0, zones[AREA + lane])
+
+
+@kernel
+def _merge_due(state: Lanes) -> None:
+    """Merge zones of the lanes whose turn it is."""
+    for lane in range(LANES):
+        running = state.case[lane] != IDLE and state.status[lane] == NOT_CONVERGED
+        if running and merges_after(coarse_of(state, lane), state.steps[lane]):
+            _merge(state, lane)
 
 
 @kernel
@@ -346,7 +306,9 @@ def march_many(
     points : array (n, 3, history points)
         Time, pressure and radius; filled where there is an end state.
     """
-    state = _make_lanes(int(cases.holes.zones[order].max()))
+    most = int(cases.holes.mesh.zones[order].max())
+    blocks = min(most, _BLOCKS)
+    state = make_lanes(blocks, most)
     record = np.empty((LANES, 2048, 3))
     taken = running = longest = 0
     for lane in range(min(LANES, order.size)):
@@ -359,7 +321,7 @@ def march_many(
             done = 0
             for lane in range(LANES):
                 ended = state.status[lane] != NOT_CONVERGED or state.steps[lane] >= max_steps
-                if state.case[lane] == _IDLE or not ended:
+                if state.case[lane] == IDLE or not ended:
                     continue
                 _retire(state, cases, lane, record, out, points)
                 running -= 1
@@ -372,19 +334,23 @@ def march_many(
             break
         longest = 0
         for lane in range(LANES):
-            if state.case[lane] != _IDLE:
+            if state.case[lane] != IDLE:
                 longest = max(longest, state.steps[lane])
         if longest + 2 > record.shape[1]:
             record = _longer(record)
         _begin_step(state)
         nodes = 0
         for lane in range(LANES):
-            if state.case[lane] != _IDLE:
+            if state.case[lane] != IDLE:
                 nodes = max(nodes, state.active[lane])
+        if nodes + 2 > blocks and blocks < most:
+            blocks = min(2 * blocks, most)
+            state = with_blocks(state, blocks)
         kick_and_move(state.zones, state.rows, nodes)
-        most = _after_kick(state, cases)
-        update_lanes(state.zones, state.rows, most, state.edges, state.fallbacks)
+        reached = _after_kick(state, cases)
+        update_lanes(state.zones, state.rows, reached, state.edges, state.fallbacks)
         done = _finish_step(state, cases, record)
+        _merge_due(state)
         if longest + 1 >= max_steps:
             done += 1
 

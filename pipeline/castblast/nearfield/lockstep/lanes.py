@@ -32,6 +32,7 @@ from castblast.nearfield.rock.zone import (
     elastic,
     extent,
     hoop_compressive,
+    per_area_between,
     resist,
     squeeze_rate,
     try_one_plane,
@@ -50,7 +51,7 @@ _ZONE_ROWS: Final = 17
 BLOCK: Final = _ZONE_ROWS * LANES
 
 # Rows of what a lane has once: constants, the step, sums; then scratch of the zone at hand.
-_LANE_ROWS: Final = 44
+_LANE_ROWS: Final = 46
 (
     FRICTION, DILATION, LAME, TWICE_SHEAR, STIFFNESS, SHEAR_COMPLIANCE, TENSILE_COMPLIANCE,
     SHEAR_STRAIN, UCS, DENSITY, LINEAR, QUADRATIC, BRITTLE, ACTIVE, KICK, STEP, PER_SECOND,
@@ -58,6 +59,7 @@ _LANE_ROWS: Final = 44
     NEW_PER_AREA, RADIAL_STRAIN, HOOP_STRAIN, NEW_RADIAL, NEW_HOOP, NEW_AXIAL, FLOW_SHEAR,
     FLOW_OPENING, FLOW_SHEAR_WORK, FLOW_TENSILE_WORK, FLOW_STRAIN, NOW_UCS, NOW_TENSION,
     SHEAR_SHORTFALL, TENSILE_SHORTFALL, UNSOLVED, LAST, BEFORE, HERE,
+    KICKED, AHEAD,
 ) = (row * LANES for row in range(_LANE_ROWS))  # fmt: skip
 
 
@@ -76,7 +78,7 @@ class EdgeModels(NamedTuple):
 
 @kernel
 def lane_array_sizes(zones: int) -> tuple[int, int]:
-    """Lengths of the array of the zones and of that of the lanes.
+    """Lengths of the array of so many zones in motion and of that of the lanes.
 
     The last zone has an outer node and looks at the compression of a zone beyond it.
     """
@@ -89,15 +91,12 @@ def kick_and_move(zones: FloatArray, lanes: FloatArray, nodes: int) -> None:
     for j in range(nodes):
         block = j * BLOCK
         for lane in range(LANES):
-            velocity = zones[block + VELOCITY + lane]
-            kicked = (
-                velocity
-                + lanes[KICK + lane]
-                * zones[block + FORCE + lane]
-                * (zones[block + PER_MASS + lane])
-            )
+            velocity, force = zones[block + VELOCITY + lane], zones[block + FORCE + lane]
+            gained = lanes[KICK + lane] * force * zones[block + PER_MASS + lane]
+            kicked = velocity + gained
             # The outermost node of a lane with fewer zones has moved with its boundary.
             inside = j < lanes[ACTIVE + lane]
+            lanes[KICKED + lane] += force * gained if inside else 0.0
             zones[block + VELOCITY + lane] = kicked if inside else velocity
             zones[block + RADIUS + lane] += lanes[STEP + lane] * kicked if inside else 0.0
 
@@ -117,11 +116,17 @@ def _old_stress(zones: FloatArray, here: int) -> Stress:
 
 
 @fused_kernel
-def _squeeze_rate(zones: FloatArray, here: int) -> float:
+def _per_area(zones: FloatArray, here: int) -> float:
+    return per_area_between(zones[here + RADIUS], zones[here + BLOCK + RADIUS])
+
+
+@fused_kernel
+def _squeeze_rate(zones: FloatArray, here: int, per_area: float) -> float:
     outer = here + BLOCK
     return squeeze_rate(
-        zones[here + RADIUS], zones[outer + RADIUS], zones[here + VELOCITY], zones[outer + VELOCITY]
-    )
+        zones[here + RADIUS], zones[outer + RADIUS], zones[here + VELOCITY],
+        zones[outer + VELOCITY], per_area,
+    )  # fmt: skip
 
 
 @fused_kernel
@@ -139,7 +144,10 @@ def _strain_and_return(zones: FloatArray, lanes: FloatArray, j: int) -> int:
         here = block + lane
         planes = _planes(lanes, lane)
         inner = zones[here + RADIUS]
-        d = deform(inner, zones[here + BLOCK + RADIUS], zones[here + WIDTH], zones[here + MEAN])
+        d = deform(
+            inner, zones[here + BLOCK + RADIUS], lanes[AHEAD + lane], zones[here + WIDTH],
+            zones[here + MEAN],
+        )  # fmt: skip
         old = _old_stress(zones, here)
         swelling = d.width * d.mean * zones[here + PER_AREA]
         t = try_one_plane(
@@ -207,7 +215,11 @@ def _flow_and_resist(zones: FloatArray, lanes: FloatArray, j: int) -> None:
             lanes[BRITTLE + lane] > 0.0, opening, zones[here + TENSION]
         )
         rate = lanes[HERE + lane]
-        following = _squeeze_rate(zones, here + BLOCK) if j + 1 < lanes[LAST + lane] else rate
+        ahead = _per_area(zones, here + BLOCK)
+        following = (
+            _squeeze_rate(zones, here + BLOCK, ahead) if j + 1 < lanes[LAST + lane] else rate
+        )
+        lanes[AHEAD + lane] = ahead
         r = resist(
             d, stress, lanes[PER_SECOND + lane], Squeeze(lanes[BEFORE + lane], rate, following),
             lanes[STIFFNESS + lane], lanes[DENSITY + lane],
@@ -219,7 +231,7 @@ def _flow_and_resist(zones: FloatArray, lanes: FloatArray, j: int) -> None:
         lanes[SHEAR_WORK + lane] += area * shear_work if reached else 0.0
         lanes[TENSILE_WORK + lane] += area * tensile_work if reached else 0.0
         lanes[VISCOUS_WORK + lane] += spent if reached else 0.0
-        zones[here + VISCOUS] = r.viscous
+        zones[here + VISCOUS] = r.viscous if reached else 0.0
         lanes[LIMIT + lane] = min(lanes[LIMIT + lane], r.limit if reached else np.inf)
         fastest = max(abs(d.radial), abs(d.hoop))
         lanes[FASTEST + lane] = max(lanes[FASTEST + lane], fastest if reached else 0.0)
@@ -238,7 +250,9 @@ def update_lanes(
     """
     for lane in range(LANES):
         zones[FORCE + lane] = 0.0
-        lanes[HERE + lane] = lanes[BEFORE + lane] = _squeeze_rate(zones, lane)
+        lanes[AHEAD + lane] = _per_area(zones, lane)
+        lanes[HERE + lane] = _squeeze_rate(zones, lane, lanes[AHEAD + lane])
+        lanes[BEFORE + lane] = lanes[HERE + lane]
     for j in range(active):
         if _strain_and_return(zones, lanes, j) > 0:
             _return_to_edges(zones, lanes, j * BLOCK, edges, fallbacks)
@@ -274,9 +288,9 @@ def _return_to_edges(
 @kernel
 def load_lane(
     zones: FloatArray, lanes: FloatArray, edges: EdgeModels, lane: int, body: Body,
-    material: Material, model: YieldModel,
+    material: Material, model: YieldModel, count: int,
 ) -> None:  # fmt: skip
-    """Put an annulus at time zero into a lane."""
+    """Put an annulus at time zero into a lane: its constants and its first `count` zones."""
     planes = model.planes
     lanes[FRICTION + lane], lanes[DILATION + lane] = planes.friction, planes.dilation
     lanes[LAME + lane], lanes[TWICE_SHEAR + lane] = planes.lame, planes.twice_shear
@@ -295,15 +309,14 @@ def load_lane(
         for i in range(3):
             for j in range(3):
                 edges.inverse[lane, k, i, j] = model.inverse[k, i, j]
-    last = body.width.size
-    lanes[LAST + lane] = last
-    for j in range(last + 1):
+    lanes[LAST + lane] = body.width.size
+    for j in range(count + 1):
         here = j * BLOCK + lane
         zones[here + RADIUS] = body.radius[j]
         zones[here + VELOCITY] = body.velocity[j]
         zones[here + FORCE] = body.force[j]
         zones[here + PER_MASS] = body.per_mass[j]
-        if j == last:
+        if j == count:
             break
         zones[here + WIDTH], zones[here + MEAN] = body.width[j], body.mean_radius[j]
         zones[here + RADIAL], zones[here + HOOP] = body.radial[j], body.hoop[j]
@@ -317,15 +330,14 @@ def load_lane(
 
 
 @kernel
-def unload_lane(zones: FloatArray, lane: int, body: Body) -> None:
-    """Copy the state of a lane into a body."""
-    last = body.width.size
-    for j in range(last + 1):
+def unload_lane(zones: FloatArray, lane: int, active: int, body: Body) -> None:
+    """Copy the zones of a lane that are in motion into a body at rest."""
+    for j in range(active + 1):
         here = j * BLOCK + lane
         body.radius[j] = zones[here + RADIUS]
         body.velocity[j] = zones[here + VELOCITY]
         body.force[j] = zones[here + FORCE]
-        if j == last:
+        if j == active:
             break
         body.width[j], body.mean_radius[j] = zones[here + WIDTH], zones[here + MEAN]
         body.radial[j], body.hoop[j] = zones[here + RADIAL], zones[here + HOOP]

@@ -57,6 +57,7 @@ from castblast.nearfield.rock.zone import (
     elastic,
     extent,
     hoop_compressive,
+    per_area_between,
     resist,
     squeeze_rate,
     try_one_plane,
@@ -70,7 +71,7 @@ SHEAR, TENSION, VISCOUS, BOUNDARY, LOAD, RAMP = 0, 1, 2, 3, 4, 5
 LEDGER_SIZE = 6
 
 #: Largest strain of a zone in one step; the work of a step is right to its square.
-STRAIN_STEP = 0.0035
+STRAIN_STEP = 0.0045
 
 
 class Material(NamedTuple):
@@ -176,6 +177,17 @@ def graded_radii(
             nodes[i] = inner + length * i / zones
         return nodes
     share = first / reach
+    q = mesh_growth(length, zones, first, reach)
+    for i in range(count):
+        e = np.expm1(q * i)
+        nodes[i] = inner + first * e / (q - share * e)
+    return nodes
+
+
+@kernel
+def mesh_growth(length: float, zones: float, first: float, reach: float) -> float:
+    """Growth q of `graded_radii` that puts the last node at `length` [m] from the wall."""
+    share = first / reach
     low, high = 1e-12, 4.0
     for _ in range(100):
         q = 0.5 * (low + high)
@@ -183,10 +195,7 @@ def graded_radii(
             high = q
         else:
             low = q
-    for i in range(count):
-        e = np.expm1(q * i)
-        nodes[i] = inner + first * e / (q - share * e)
-    return nodes
+    return q
 
 
 @kernel
@@ -230,6 +239,19 @@ def make_body(
 
 
 @kernel
+def first_zones(body: Body, count: int) -> Body:
+    """The body without the zones beyond the first `count`: views, nothing is copied."""
+    n, b = count + 1, body
+    return Body(
+        b.initial_radius[:n], b.mass[:n], b.per_mass[:n], b.radius[:n], b.velocity[:n],
+        b.force[:n], b.initial_area[:count], b.per_initial_area[:count], b.width[:count],
+        b.mean_radius[:count], b.radial[:count], b.hoop[:count], b.axial[:count],
+        b.viscous[:count], b.tension[:count], b.shear_multiplier[:count],
+        b.tensile_multiplier[:count], b.hoop_multiplier[:count], b.shear_strain[:count],
+    )  # fmt: skip
+
+
+@kernel
 def update_zones(
     body: Body, active: int, dt: float, material: Material, model: YieldModel, work: FloatArray
 ) -> tuple[float, int]:
@@ -254,14 +276,18 @@ def update_zones(
     per_second = 1.0 / dt
     limit, fastest, fallbacks = np.inf, 0.0, 0
     force[0] = 0.0
-    here = squeeze_rate(radius[0], radius[1], velocity[0], velocity[1])
+    ahead = per_area_between(radius[0], radius[1])
+    here = squeeze_rate(radius[0], radius[1], velocity[0], velocity[1], ahead)
     before = here
     for j in range(active):
-        after = here
+        after, per_new_area = here, ahead
         if j + 1 < widths.size:
-            after = squeeze_rate(radius[j + 1], radius[j + 2], velocity[j + 1], velocity[j + 2])
+            ahead = per_area_between(radius[j + 1], radius[j + 2])
+            after = squeeze_rate(
+                radius[j + 1], radius[j + 2], velocity[j + 1], velocity[j + 2], ahead
+            )
         old_width, old_mean, area = widths[j], means[j], areas[j]
-        d = deform(radius[j], radius[j + 1], old_width, old_mean)
+        d = deform(radius[j], radius[j + 1], per_new_area, old_width, old_mean)
         old = Stress(radial[j], hoop[j], axial[j])
         trial = elastic(planes, d, old)
         swelling = d.width * d.mean * per_area[j]
