@@ -7,7 +7,6 @@ and results come back in the order of the pieces.
 from __future__ import annotations
 
 import multiprocessing
-import os
 import pickle
 import signal
 from collections.abc import Callable, Iterator, Sequence
@@ -16,6 +15,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+from castblast.cores import available_cores
 from castblast.errors import SimulationError
 from castblast.progress import ProgressCallback, part, silent
 
@@ -115,13 +115,6 @@ def _interrupts_for_parent_only() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def available_cores() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _run_here(job: Job) -> Any:

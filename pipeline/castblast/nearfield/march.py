@@ -29,17 +29,20 @@ from castblast.nearfield.clock import (
 )
 from castblast.nearfield.rock.body_merging import merge_body
 from castblast.nearfield.rock.lagrangian import (
-    BOUNDARY,
-    LEDGER_SIZE,
-    LOAD,
-    RAMP,
-    VISCOUS,
     Body,
     FloatArray,
     Material,
     graded_radii,
     make_body,
     update_zones,
+)
+from castblast.nearfield.rock.ledger import (
+    BOUNDARY,
+    LEDGER_SIZE,
+    LOAD,
+    RAMP,
+    VISCOUS,
+    lost_to_growth,
 )
 from castblast.nearfield.rock.merging import EVERY, Coarse, Passed
 from castblast.nearfield.rock.mohr_coulomb import YieldModel, make_yield_model
@@ -181,7 +184,7 @@ def _kick(body: Body, active: int, clock: Clock, case: Annulus, work: FloatArray
         gained = dt * body.force[i] * body.per_mass[i]
         body.velocity[i] += gained
         spent += body.force[i] * gained
-    work[VISCOUS] += lost_to_growth(clock, spent)
+    work[VISCOUS] += lost_to_growth(clock.previous_step, clock.step, spent)
     if active == last:
         body.velocity[last], spent = kick_boundary(
             case, dt, body.radius[last], body.initial_radius[last], body.velocity[last],
@@ -194,23 +197,6 @@ def _kick(body: Body, active: int, clock: Clock, case: Annulus, work: FloatArray
 def kick_of(clock: Clock) -> float:
     """Time [s] from the middle of the last step to that of the next."""
     return 0.5 * (clock.previous_step + clock.step)
-
-
-@inline_kernel
-def lost_to_growth(clock: Clock, spent: float) -> float:
-    """Energy [J/m per radian] that a leapfrog loses where its step grows.
-
-    It keeps an energy that departs from the true one by m a^2 dt^2 / 8 a node. With the step that
-    share changes, and the motion gains so much less than the forces work: a numerical dissipation
-    like that of the viscosity, known exactly.
-
-    Parameters
-    ----------
-    clock : Clock
-    spent : float [N m s-1]
-        Force times the change of the velocity in the kick, summed over the nodes.
-    """
-    return 0.25 * (clock.step - clock.previous_step) * spent
 
 
 @inline_kernel

@@ -13,18 +13,8 @@ from castblast.errors import Status
 from castblast.explosive.isentrope import energy, pressure
 from castblast.kernel import kernel
 from castblast.nearfield.march import Annulus, March
-from castblast.nearfield.rock.lagrangian import (
-    BOUNDARY,
-    LOAD,
-    RAMP,
-    SHEAR,
-    TENSION,
-    VISCOUS,
-    Body,
-    FloatArray,
-    elastic_energy,
-    kinetic_energy,
-)
+from castblast.nearfield.rock.lagrangian import Body, FloatArray, elastic_energy, kinetic_energy
+from castblast.nearfield.rock.ledger import BOUNDARY, LOAD, RAMP, SHEAR, TENSION, VISCOUS
 
 _OK = int(Status.OK)
 _RETURN_MAP_FAILED = int(Status.RETURN_MAP_FAILED)

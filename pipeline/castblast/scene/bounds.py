@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from castblast.cores import available_cores
 from castblast.errors import SpecError
-from castblast.jobs import available_cores
 from castblast.muckpile.balls.contact import ContactLaw, damped_step_factor
 from castblast.muckpile.bench.sizes import Sizes, mean_of_power
 from castblast.scene.memory import require_memory

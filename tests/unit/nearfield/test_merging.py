@@ -8,14 +8,8 @@ from castblast.nearfield import solver
 from castblast.nearfield.case import NearFieldSettings
 from castblast.nearfield.march import march
 from castblast.nearfield.rock.body_merging import merge_body
-from castblast.nearfield.rock.lagrangian import (
-    LEDGER_SIZE,
-    VISCOUS,
-    Body,
-    Material,
-    elastic_energy,
-    make_body,
-)
+from castblast.nearfield.rock.lagrangian import Body, Material, elastic_energy, make_body
+from castblast.nearfield.rock.ledger import LEDGER_SIZE, VISCOUS
 from castblast.nearfield.rock.merging import Coarse, Passed
 from castblast.nearfield.rock.mohr_coulomb import make_yield_model
 

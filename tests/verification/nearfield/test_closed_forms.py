@@ -13,7 +13,8 @@ from near_field_problems import annulus, rock, wave_speed
 
 from castblast.nearfield.case import Rock
 from castblast.nearfield.march import march
-from castblast.nearfield.rock.lagrangian import VISCOUS, graded_radii
+from castblast.nearfield.rock.lagrangian import graded_radii
+from castblast.nearfield.rock.ledger import VISCOUS
 
 
 def cauchy(body):

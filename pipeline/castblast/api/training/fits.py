@@ -12,12 +12,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from castblast.cores import available_cores
 from castblast.disk.files import write_csv, write_json, write_text
 from castblast.disk.plain import json_text
 from castblast.disk.reading import read_json, read_text
 from castblast.errors import SpecError
 from castblast.extras import missing_libraries, missing_line, require
-from castblast.jobs import Job, available_cores, run_jobs
+from castblast.jobs import Job, run_jobs
 from castblast.progress import ProgressCallback, part, silent
 
 if TYPE_CHECKING:

@@ -18,11 +18,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from castblast.cores import available_cores
 from castblast.dataset.building.meter import Meter
 from castblast.dataset.building.shards import ShardReport, ShardTask, run_shard
 from castblast.dataset.building.work import Work
 from castblast.errors import DatasetError, SimulationError, SpecError
-from castblast.jobs import available_cores
 from castblast.progress import ProgressCallback, silent
 from castblast.stopping import interruptible
 

@@ -58,7 +58,6 @@ from castblast.nearfield.march import (
     March,
     kick_boundary,
     kick_of,
-    lost_to_growth,
     merges_after,
     passed_by,
     prepare,
@@ -66,7 +65,8 @@ from castblast.nearfield.march import (
     status_after,
 )
 from castblast.nearfield.outcome import end_state, histories
-from castblast.nearfield.rock.lagrangian import (
+from castblast.nearfield.rock.lagrangian import FloatArray, make_body, step_limit
+from castblast.nearfield.rock.ledger import (
     BOUNDARY,
     LEDGER_SIZE,
     LOAD,
@@ -74,9 +74,7 @@ from castblast.nearfield.rock.lagrangian import (
     SHEAR,
     TENSION,
     VISCOUS,
-    FloatArray,
-    make_body,
-    step_limit,
+    lost_to_growth,
 )
 from castblast.nearfield.rock.merging import node_mass
 from castblast.nearfield.rock.mohr_coulomb import IntArray, make_yield_model
@@ -147,7 +145,8 @@ def _after_kick(state: Lanes, cases: Cases) -> int:
         if state.case[lane] == IDLE:
             continue
         spent = state.rows[KICKED + lane]
-        state.rows[VISCOUS_WORK + lane] += lost_to_growth(clock_of(state, lane), spent)
+        clock = clock_of(state, lane)
+        state.rows[VISCOUS_WORK + lane] += lost_to_growth(clock.previous_step, clock.step, spent)
         active, last = state.active[lane], int(state.rows[LAST + lane])
         if active == last:
             _move_boundary(state, cases, lane)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from castblast.kernel import inline_kernel, kernel
-from castblast.nearfield.rock.lagrangian import VISCOUS, Body, FloatArray, first_zones
+from castblast.nearfield.rock.lagrangian import Body, FloatArray, first_zones
+from castblast.nearfield.rock.ledger import VISCOUS
 from castblast.nearfield.rock.merging import (
     BoolArray,
     Coarse,

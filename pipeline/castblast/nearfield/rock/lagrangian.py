@@ -46,6 +46,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from castblast.kernel import fused_kernel, inline_kernel, kernel
+from castblast.nearfield.rock.ledger import SHEAR, TENSION, VISCOUS
 from castblast.nearfield.rock.mohr_coulomb import YieldModel, edge_return
 from castblast.nearfield.rock.zone import (
     Flow,
@@ -65,10 +66,6 @@ from castblast.nearfield.rock.zone import (
 )
 
 FloatArray: TypeAlias = NDArray[np.float64]
-
-# Slots of the work ledger, per radian.
-SHEAR, TENSION, VISCOUS, BOUNDARY, LOAD, RAMP = 0, 1, 2, 3, 4, 5
-LEDGER_SIZE = 6
 
 #: Largest strain of a zone in one step; the work of a step is right to its square.
 STRAIN_STEP = 0.0045
