@@ -85,10 +85,11 @@ def test_folders_hold_few_files(repository: Path, top: str) -> None:
     assert not full
 
 
-def test_files_stay_short(repository: Path) -> None:
+@pytest.mark.parametrize("top", ["pipeline", "tests"])
+def test_files_stay_short(repository: Path, top: str) -> None:
     long = {
         str(path.relative_to(repository)): lines
-        for path in (repository / "pipeline").rglob("*.py")
+        for path in (repository / top).rglob("*.py")
         if (lines := len(path.read_text(encoding="utf-8").splitlines())) > MOST_LINES
     }
     assert not long
