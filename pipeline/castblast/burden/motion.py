@@ -51,7 +51,14 @@ def solve_burden_motion(
     )
     histories = np.full((1, 4, HISTORY_POINTS), nan)
     batch = solve_with_histories([explosive], columns, histories)
-    return BurdenResult(*(values[0].item() for values in batch), *histories[0])
+    time, pressure, velocity, displacement = histories[0]
+    return BurdenResult(
+        **{name: values[0].item() for name, values in batch._asdict().items()},
+        history_time=time,
+        history_pressure=pressure,
+        history_velocity=velocity,
+        history_displacement=displacement,
+    )
 
 
 def no_burden_motion(status: Status) -> BurdenResult:

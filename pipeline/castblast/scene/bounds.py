@@ -57,13 +57,18 @@ class FrameOrder(NamedTuple):
 def sizes_of_table(sizes: Sizes, count: int) -> BallSizes:
     """Describe `count` balls of a distribution."""
     smallest, largest = float(sizes.radius[0]), float(sizes.radius[-1])
-    return BallSizes(count, smallest, largest, mean_of_power(sizes, 3))
+    return BallSizes(
+        number=count, smallest=smallest, largest=largest, mean_cube=mean_of_power(sizes, 3)
+    )
 
 
 def sizes_of_balls(radius: FloatArray) -> BallSizes:
     """Describe given balls by their radii (n,) [m]."""
     return BallSizes(
-        len(radius), float(radius.min()), float(radius.max()), float(np.mean(radius**3))
+        number=len(radius),
+        smallest=float(radius.min()),
+        largest=float(radius.max()),
+        mean_cube=float(np.mean(radius**3)),
     )
 
 

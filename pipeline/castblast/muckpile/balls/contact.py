@@ -129,21 +129,21 @@ def law_constants(law: ContactLaw, real: DTypeLike = np.float64) -> Constants:
     shear_ratio = 1.0 / float(law.stiffness_ratio)
     mode = int(law.dashpot_mode)
     return Constants(
-        kind(law.effective_modulus),
-        kind(shear_ratio),
-        kind(law.friction),
-        kind(law.rolling_friction),
-        kind(law.damping_normal),
-        kind(float(law.damping_shear) * sqrt(shear_ratio)),
-        mode in (DashpotMode.NO_TENSION, DashpotMode.NO_TENSION_SLIP_CUT),
-        mode in (DashpotMode.SLIP_CUT, DashpotMode.NO_TENSION_SLIP_CUT),
-        kind(law.density),
-        bool(law.cap_on_total),
-        kind(0.0),
-        kind(0.5),
-        kind(1.0),
-        kind(_TINY),
-        kind(_ALMOST),
+        modulus=kind(law.effective_modulus),
+        shear_ratio=kind(shear_ratio),
+        friction=kind(law.friction),
+        rolling_friction=kind(law.rolling_friction),
+        damping_normal=kind(law.damping_normal),
+        damping_shear=kind(float(law.damping_shear) * sqrt(shear_ratio)),
+        no_tension=mode in (DashpotMode.NO_TENSION, DashpotMode.NO_TENSION_SLIP_CUT),
+        slip_cut=mode in (DashpotMode.SLIP_CUT, DashpotMode.NO_TENSION_SLIP_CUT),
+        density=kind(law.density),
+        cap_on_total=bool(law.cap_on_total),
+        zero=kind(0.0),
+        half=kind(0.5),
+        one=kind(1.0),
+        tiny=kind(_TINY),
+        almost=kind(_ALMOST),
     )
 
 

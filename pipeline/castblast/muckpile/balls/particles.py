@@ -56,11 +56,11 @@ def particles_at_rest(
     speed = np.zeros((count, 3)) if velocity is None else np.array(velocity, dtype=np.float64)
     group = np.full(count, -1) if block is None else np.array(block)
     return Particles(
-        centre,
-        np.ascontiguousarray(speed.reshape(count, 3)),
-        np.zeros((count, 3)),
-        np.array(radius, dtype=np.float64, order="C").reshape(count),
-        group.astype(np.int64).reshape(count),
+        position=centre,
+        velocity=np.ascontiguousarray(speed.reshape(count, 3)),
+        angular_velocity=np.zeros((count, 3)),
+        radius=np.array(radius, dtype=np.float64, order="C").reshape(count),
+        block=group.astype(np.int64).reshape(count),
     )
 
 

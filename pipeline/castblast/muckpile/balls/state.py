@@ -84,11 +84,11 @@ def make_contacts(
     """Make room for contacts that do not touch yet."""
     count = len(partner)
     return Contacts(
-        start,
-        partner,
-        np.empty((count, ROW), dtype=real),
-        np.zeros(count, dtype=np.uint8),
-        np.empty((count if ledger else 0, 3), dtype=real),
+        start=start,
+        partner=partner,
+        memory=np.empty((count, ROW), dtype=real),
+        touching=np.zeros(count, dtype=np.uint8),
+        dash=np.empty((count if ledger else 0, 3), dtype=real),
     )
 
 

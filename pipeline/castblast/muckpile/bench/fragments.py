@@ -279,7 +279,13 @@ def cut_sizes(curve: SizeCurve, smallest: float, largest: float) -> CutSizes:
         message = f"no fragments lie between {smallest:g} and {largest:g} m"
         raise ValueError(message)
     sizes = sizes_by_volume(diameter, share)
-    return CutSizes(sizes, smallest, largest, float(share[0]), float(1.0 - share[-1]))
+    return CutSizes(
+        sizes=sizes,
+        smallest=smallest,
+        largest=largest,
+        finer=float(share[0]),
+        coarser=float(1.0 - share[-1]),
+    )
 
 
 def smallest_for_count(curve: SizeCurve, largest: float, solid_volume: float, count: int) -> float:

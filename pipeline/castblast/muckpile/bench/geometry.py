@@ -95,7 +95,14 @@ def polygon_bench(
     kinds = edges or default_edges(points)
     places = tuple((float(x), float(y)) for x, y in points)
     return Bench(
-        float(length), float(width), height, face_angle, burden, spacing, places, tuple(kinds)
+        length=float(length),
+        width=float(width),
+        height=height,
+        face_angle=face_angle,
+        burden=burden,
+        spacing=spacing,
+        corners=places,
+        edges=tuple(kinds),
     )
 
 

@@ -55,7 +55,7 @@ def make_outline(corner: FloatArray, edges: tuple[str, ...], face_angle: float) 
     leaning = (np.array(edges) == FREE) & (face_angle < pi / 2.0)
     back = np.where(leaning, 1.0 / tan(min(face_angle, 1.57)), 0.0)
     sine = np.where(leaning, sin(face_angle), 1.0)
-    return Outline(corner, _corner_shift(normal, back), normal, sine)
+    return Outline(corner=corner, lean=_corner_shift(normal, back), normal=normal, sine=sine)
 
 
 def edge_normals(corner: FloatArray) -> FloatArray:

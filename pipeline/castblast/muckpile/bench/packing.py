@@ -341,12 +341,12 @@ def _settle(
     )
     progress(1.0, f"packing: {len(state.radius)} balls at rest")
     return Packing(
-        particles,
-        solid_fraction(particles, bench),
-        float(np.max(state.position[:, 2] + state.radius)),
-        run.mean_overlap(),
-        run.clock,
-        status,
+        particles=particles,
+        solid_fraction=solid_fraction(particles, bench),
+        height=float(np.max(state.position[:, 2] + state.radius)),
+        mean_overlap=run.mean_overlap(),
+        time=run.clock,
+        status=status,
     )
 
 

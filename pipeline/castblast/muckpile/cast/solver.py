@@ -111,11 +111,11 @@ class _Record:
         """Return the samples as arrays."""
         table = np.array(self.rows, dtype=np.float64)
         return CastHistory(
-            table[:, 0].copy(),
-            table[:, 1].copy(),
-            table[:, 2].copy(),
-            table[:, 3:6].copy(),
-            table[:, 6].astype(np.int64),
+            time=table[:, 0].copy(),
+            translational_energy=table[:, 1].copy(),
+            rotational_energy=table[:, 2].copy(),
+            centre_of_mass=table[:, 3:6].copy(),
+            contacts=table[:, 6].astype(np.int64),
         )
 
 
@@ -248,22 +248,22 @@ def _run_to_rest(
         keeper.keep(_state_of(parts))
     progress(1.0, _line(record))
     return CastResult(
-        state,
-        run.clock,
-        status,
-        run.failed_ball,
-        run.clock if run.failed else nan,
-        record.history(),
-        _close_ledger(case, run, record.initial, record.fired),
-        CastCounters(
-            run.steps,
-            run.rebuilds,
-            run.steps * len(state.radius),
-            run.smallest_step,
-            run.largest_step,
-            record.largest_overlap,
-            record.deep_share,
-            perf_counter() - began,
+        particles=state,
+        time=run.clock,
+        status=status,
+        failed_ball=run.failed_ball,
+        failed_time=run.clock if run.failed else nan,
+        history=record.history(),
+        ledger=_close_ledger(case, run, record.initial, record.fired),
+        counters=CastCounters(
+            steps=run.steps,
+            rebuilds=run.rebuilds,
+            particle_steps=run.steps * len(state.radius),
+            smallest_step=run.smallest_step,
+            largest_step=run.largest_step,
+            largest_overlap=record.largest_overlap,
+            deep_share=record.deep_share,
+            seconds=perf_counter() - began,
         ),
     )
 
@@ -312,13 +312,13 @@ def _close_ledger(
     open_balance = before + fired - kinetic - potential - spring - gone
     scale = max(abs(fired), abs(initial[1] - potential), initial[0], 1e-300)
     return EnergyLedger(
-        before,
-        fired,
-        kinetic,
-        potential,
-        spring,
-        slip,
-        rolling_slip,
-        dashpot,
-        open_balance / scale,
+        initial=before,
+        fired=fired,
+        kinetic=kinetic,
+        potential=potential,
+        spring=spring,
+        slip=slip,
+        rolling_slip=rolling_slip,
+        dashpot=dashpot,
+        residual=open_balance / scale,
     )

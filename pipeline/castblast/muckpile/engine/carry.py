@@ -45,10 +45,10 @@ def put_aside(contacts: Contacts) -> Memory:
     start = starts(number)
     count = int(start[-1])
     memory = Memory(
-        start,
-        np.empty(count, dtype=np.int32),
-        np.empty((count, ROW), dtype=contacts.memory.dtype),
-        np.empty((count if len(contacts.dash) else 0, 3), dtype=contacts.dash.dtype),
+        start=start,
+        partner=np.empty(count, dtype=np.int32),
+        rows=np.empty((count, ROW), dtype=contacts.memory.dtype),
+        dash=np.empty((count if len(contacts.dash) else 0, 3), dtype=contacts.dash.dtype),
     )
     _copy_touching(contacts, memory)
     return memory

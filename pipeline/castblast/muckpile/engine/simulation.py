@@ -120,11 +120,11 @@ class Simulation:
         motion[:, 7] = self.held
         motion[self.held, 0:6] = 0.0
         self._balls = Balls(
-            np.column_stack([given.position, given.radius]),
-            motion,
-            np.zeros((count, 8), dtype=real),
-            np.empty((7, 0), dtype=np.float32),
-            np.arange(count, dtype=np.int32),
+            place=np.column_stack([given.position, given.radius]),
+            motion=motion,
+            force=np.zeros((count, 8), dtype=real),
+            paths=np.empty((7, 0), dtype=np.float32),
+            identity=np.arange(count, dtype=np.int32),
         )
         none = np.zeros(count + 1, dtype=np.int32)
         self._pairs = make_contacts(none, none[:0], real, self.keep_ledger)
@@ -166,7 +166,11 @@ class Simulation:
         velocity[balls.identity] = balls.motion[:, 0:3]
         spin[balls.identity] = balls.motion[:, 3:6]
         return Particles(
-            position, velocity, spin, self.particles.radius.copy(), self.particles.block.copy()
+            position=position,
+            velocity=velocity,
+            angular_velocity=spin,
+            radius=self.particles.radius.copy(),
+            block=self.particles.block.copy(),
         )
 
     def survey_balls(self) -> BallSurvey:
@@ -283,7 +287,7 @@ class Simulation:
             value = arrays[name]
             setattr(self, name, value if value.ndim else value.item())
         for group, kind in _GROUPS.items():
-            setattr(self, group, kind(*(arrays[f"{group}.{name}"] for name in kind._fields)))
+            setattr(self, group, kind(**{n: arrays[f"{group}.{n}"] for n in kind._fields}))
 
     # -- lists -------------------------------------------------------------------------------
 

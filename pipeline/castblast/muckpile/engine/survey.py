@@ -44,7 +44,12 @@ def survey_balls(balls: Balls) -> BallSurvey:
     require_threads()
     sums = _sum_balls(balls).sum(axis=0)
     mass, translation, rotation = map(float, sums[0:3])
-    return BallSurvey(mass, 0.5 * translation, 0.5 * rotation, sums[3:6] / mass)
+    return BallSurvey(
+        mass=mass,
+        translational_energy=0.5 * translation,
+        rotational_energy=0.5 * rotation,
+        centre_of_mass=sums[3:6] / mass,
+    )
 
 
 @parallel_kernel
@@ -159,12 +164,12 @@ def survey_contacts(
     deepest = int(np.argmax(rows[:, 1]))
     energy, _, total, contacts, _, deep = map(float, rows.sum(axis=0))
     return ContactSurvey(
-        energy,
-        float(rows[deepest, 1]),
-        total,
-        int(contacts),
-        int(rows[deepest, 4]),
-        deep / len(balls.place),
+        energy=energy,
+        largest_overlap=float(rows[deepest, 1]),
+        total_overlap=total,
+        contacts=int(contacts),
+        worst=int(rows[deepest, 4]),
+        deep_share=deep / len(balls.place),
     )
 
 

@@ -63,9 +63,16 @@ def make_table(
     row = np.zeros((count, FACET_WORDS))
     if count == 0:
         none, empty = np.zeros(1, np.int64), np.zeros(0, np.int32)
-        span = np.zeros((0, 2), np.int32)
         return WallTable(
-            plane, row, none, empty, empty.astype(np.uint8), none, empty, span, np.zeros(7)
+            plane=plane,
+            facet=row,
+            start=none,
+            around=empty,
+            shared=empty.astype(np.uint8),
+            cell_start=none,
+            cell=empty,
+            span=np.zeros((0, 2), np.int32),
+            grid=np.zeros(7),
         )
     normal = facet_normals(corner)
     number, places = corner_numbers(corner)
@@ -80,7 +87,17 @@ def make_table(
     cell_start, cell, span, grid = _lay_grid(plan.min(axis=1), plan.max(axis=1))
     # Behind a slope of 45 degrees the nearest point lies 0.7 of the depth aside.
     grid[6] = max(1.0, 0.7 * float(depth.max()))
-    return WallTable(plane, row, start, around, shared, cell_start, cell, span, grid)
+    return WallTable(
+        plane=plane,
+        facet=row,
+        start=start,
+        around=around,
+        shared=shared,
+        cell_start=cell_start,
+        cell=cell,
+        span=span,
+        grid=grid,
+    )
 
 
 def _feature_normals(

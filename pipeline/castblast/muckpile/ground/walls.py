@@ -114,14 +114,14 @@ def rectangle(
         raise ValueError(message)
     share = np.array([friction], dtype=np.float64)
     return Walls(
-        np.asarray(origin, dtype=np.float64).reshape(1, 3),
-        first.reshape(1, 3),
-        second.reshape(1, 3),
-        np.cross(first, second).reshape(1, 3),
-        np.asarray(bounds, dtype=np.float64).reshape(1, 4),
-        share,
-        share.copy(),
-        np.array([rim]),
+        origin=np.asarray(origin, dtype=np.float64).reshape(1, 3),
+        axis1=first.reshape(1, 3),
+        axis2=second.reshape(1, 3),
+        normal=np.cross(first, second).reshape(1, 3),
+        bounds=np.asarray(bounds, dtype=np.float64).reshape(1, 4),
+        friction=share,
+        rolling_friction=share.copy(),
+        rim=np.array([rim]),
     )
 
 
@@ -170,15 +170,19 @@ def surface(
     share = np.full(len(corners), friction)
     none = np.zeros((0, 3))
     return Walls(
-        *(none, none, none, none),
-        np.zeros((0, 4)),
-        *(np.zeros(0), np.zeros(0)),
-        np.zeros(0, dtype=np.bool_),
-        corners,
-        share,
-        share.copy(),
-        np.full(len(share), depth),
-        np.full(len(share), base),
+        origin=none,
+        axis1=none,
+        axis2=none,
+        normal=none,
+        bounds=np.zeros((0, 4)),
+        friction=np.zeros(0),
+        rolling_friction=np.zeros(0),
+        rim=np.zeros(0, dtype=np.bool_),
+        corner=corners,
+        facet_friction=share,
+        facet_rolling_friction=share.copy(),
+        facet_depth=np.full(len(share), depth),
+        facet_base=np.full(len(share), base),
     )
 
 

@@ -75,7 +75,12 @@ def ballistic_cast(
     landed = before._replace(position=end)
     every = group_movement(before, landed, np.zeros(len(end), dtype=np.int64), 1)
     blocks = group_movement(before, landed, before.block, len(block_velocity))
-    return BallisticCast(every.displacement[0], blocks.displacement, end, time)
+    return BallisticCast(
+        throw=every.displacement[0],
+        block_throw=blocks.displacement,
+        landing=end,
+        flight_time=time,
+    )
 
 
 def _landing(

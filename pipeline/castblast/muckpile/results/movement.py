@@ -77,11 +77,11 @@ def group_movement(
     # Differences to the mean first: the square of a long way would hide a small spread.
     spread = np.sqrt(mean((way - displacement[number]) ** 2))
     return GroupMovement(
-        mean(place),
-        displacement,
-        spread,
-        total / np.sum(before.radius**3),
-        np.bincount(number, minlength=groups).astype(np.int64),
+        start=mean(place),
+        displacement=displacement,
+        spread=spread,
+        mass_share=total / np.sum(before.radius**3),
+        balls=np.bincount(number, minlength=groups).astype(np.int64),
     )
 
 

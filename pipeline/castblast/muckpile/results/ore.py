@@ -189,7 +189,14 @@ def move_ore(
         for k in range(count)
         for method in METHODS
     ]
-    return OreMovement(owner, movement, translated, outlined, blocks, results)
+    return OreMovement(
+        polygon=owner,
+        movement=movement,
+        translated=translated,
+        outlined=outlined,
+        blocks=blocks,
+        results=results,
+    )
 
 
 def _inside(area: Area, position: FloatArray) -> BoolArray:
@@ -294,14 +301,14 @@ def _result(
     in_dug = np.bincount(owner[dug] % len(grades), mass[dug], minlength=len(grades))
     metal = float(np.sum(in_dug[in_dug > 0.0] * grades[in_dug > 0.0]))
     return OreResult(
-        polygons[number].name,
-        method,
-        total,
-        taken,
-        1.0 - kept / total if total else nan,
-        1.0 - kept / taken if taken else nan,
-        float(mass[others].sum()) / taken if taken else nan,
-        metal / taken if taken else nan,
+        polygon=polygons[number].name,
+        method=method,
+        mass=total,
+        dug=taken,
+        loss=1.0 - kept / total if total else nan,
+        dilution=1.0 - kept / taken if taken else nan,
+        other_ore=float(mass[others].sum()) / taken if taken else nan,
+        grade=metal / taken if taken else nan,
     )
 
 

@@ -69,11 +69,21 @@ def make_grid(lower: FloatArray, upper: FloatArray, reach: float, count: int) ->
         if shape.prod() <= 8.0 * count + 64.0:
             break
         size *= 1.25
-    axis1, axis2, axis3 = map(int, axes)
-    low1, low2, low3 = map(float, low)
-    per1, per2, per3 = map(float, shape / extent)
-    n1, n2, n3 = map(int, shape)
-    return Grid(axis1, axis2, axis3, low1, low2, low3, per1, per2, per3, n1, n2, n3)
+    per = shape / extent
+    return Grid(
+        axis1=int(axes[0]),
+        axis2=int(axes[1]),
+        axis3=int(axes[2]),
+        low1=float(low[0]),
+        low2=float(low[1]),
+        low3=float(low[2]),
+        per1=float(per[0]),
+        per2=float(per[1]),
+        per3=float(per[2]),
+        n1=int(shape[0]),
+        n2=int(shape[1]),
+        n3=int(shape[2]),
+    )
 
 
 @inline_kernel

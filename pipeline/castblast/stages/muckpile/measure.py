@@ -123,7 +123,13 @@ def measure_muckpile(
     if spec.firing.pattern == "none":
         block = np.full_like(block, -1)
     before, after = before._replace(block=block), after._replace(block=block)
-    case = CastCase(before, law, walls, plan.delay, plan.velocity)
+    case = CastCase(
+        particles=before,
+        law=law,
+        walls=walls,
+        block_delay=plan.delay,
+        block_velocity=plan.velocity,
+    )
     ore = None
     if wanted.ore:
         moved = move_ore(before, after, wanted.ore, density=law.density, plan=wanted.plan)
