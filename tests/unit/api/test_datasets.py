@@ -97,7 +97,7 @@ def test_scikit_learn_and_torch_take_the_table(dataset: xr.Dataset) -> None:
     xt, yt = dataset.castblast.training_table("test")
     assert all(kind == np.float64 for kind in (*x.dtypes, *y.dtypes))
     assert set(x.filter(like="explosive_").sum(axis=1)) == {1.0}
-    model = ExtraTreesRegressor(20, random_state=0).fit(x, y["burden_velocity"])
+    model = ExtraTreesRegressor(100, random_state=0).fit(x, y["burden_velocity"])
     assert model.score(xt, yt["burden_velocity"]) > 0.8
     torch = pytest.importorskip("torch")
     assert torch.tensor(x.to_numpy()).shape == x.shape

@@ -76,7 +76,7 @@ def test_an_extension_keeps_old_rows_and_is_reproduced(castblast, castblast_here
     done = castblast("dataset", "extend", file, "--add", 8, "--out", tmp_path, "--json")
     assert done.returncode == 0, done.stderr
     more = tmp_path / "data.nc"
-    assert json.loads(done.stdout)["id"] == "full/1.3.0"
+    assert json.loads(done.stdout)["id"] == "full/1.4.0"
     done = castblast_here("dataset", "diff", file, more, "--json")
     assert done.returncode == 4
     found = json.loads(done.stdout)
