@@ -15,6 +15,8 @@ import re
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 _LABEL = re.compile(r"[^\W_][\w .,:+/()%#-]{0,119}")
 _UNIT = re.compile(r"[A-Za-z0-9%./^()\u00b0\u00b5 -]{1,32}")
+#: One part of a unit in UDUNITS spelling: a symbol, and its power where it is negative.
+_POWER = re.compile(r"(?P<symbol>[A-Za-zµ°%]+|[A-Za-zµ]+[0-9]+)(?:-(?P<below>[0-9]+))?")
 _VARIABLE = re.compile(r"[a-z][a-z0-9_]{0,63}")
 #: Devices of Windows, whatever their suffix.
 _DEVICE = re.compile(r"(?:con|prn|aux|nul|com\d|lpt\d)(?:\..*)?", re.IGNORECASE)
@@ -77,6 +79,16 @@ def is_label(text: object) -> bool:
 def is_unit(text: object) -> bool:
     """Say whether a text has the form of a unit: ``kg m-3``."""
     return isinstance(text, str) and _UNIT.fullmatch(text) is not None
+
+
+def people_unit(unit: str) -> str:
+    """Unit as people write it, from its UDUNITS spelling: ``m s-1`` is ``m/s``; parsed alike."""
+    parts = [_POWER.fullmatch(part) for part in unit.split()]
+    over = " ".join(part[0] for part in parts if part and not part["below"])
+    below = [p["symbol"] + p["below"].removeprefix("1") for p in parts if p and p["below"]]
+    if not all(parts) or not below:
+        return unit
+    return f"{over or '1'}/{below[0] if len(below) == 1 else '(' + ' '.join(below) + ')'}"
 
 
 def is_variable(text: object) -> bool:

@@ -6,13 +6,23 @@ from pathlib import Path
 import pytest
 
 from castblast.cli.screen import Screen
+from castblast.design.variables import VARIABLES
 from castblast.errors import CastblastError
-from castblast.names import cell_text, check_label, check_name, is_label, printable, shortened
+from castblast.names import (
+    cell_text,
+    check_label,
+    check_name,
+    is_label,
+    people_unit,
+    printable,
+    shortened,
+)
 from castblast.specs.bench.bench import BenchSpec
 from castblast.specs.explosive import load_explosive
 from castblast.specs.loading import make_spec, read_yaml
 from castblast.specs.models.model import read_model_spec
 from castblast.specs.recipe import load_recipe
+from castblast.specs.units import unit_factor
 
 #: Path traversal, absolute paths, markup of the terminal and of pictures, formulas, code, escapes.
 BAD_NAMES = (
@@ -115,3 +125,25 @@ def test_any_value_is_shown_in_one_short_line() -> None:
             assert len(shortened(value)) <= 60
             assert shortened(value).isprintable()
     assert shortened(10**5000) == "an integer of about 5000 digits"
+
+
+@pytest.mark.parametrize(
+    ("udunits", "people"),
+    [("m s-1", "m/s"), ("kg m-3", "kg/m3"), ("MJ m-1", "MJ/m"), ("kg m-2 s-1", "kg/(m2 s)"),
+     ("s-1", "1/s"), ("m2 s-2", "m2/s2"), ("Pa s", "Pa s"), ("deg", "deg"), ("1", "1"),
+     ("J/kg", "J/kg")],
+)  # fmt: skip
+def test_units_are_shown_as_people_write_them(udunits: str, people: str) -> None:
+    """No negative powers on screens."""
+    assert people_unit(udunits) == people
+
+
+@pytest.mark.parametrize("name", VARIABLES)
+def test_a_shown_unit_can_be_typed_again(name: str) -> None:
+    """What a screen shows is read back as the same unit, and has no negative power."""
+    variable = VARIABLES[name]
+    assert "-" not in variable.shown_unit
+    shown, written = (
+        unit_factor(u, variable.unit) for u in (variable.shown_unit, variable.file_unit)
+    )
+    assert shown == written

@@ -84,7 +84,7 @@ def simulate(
     >>> import castblast as cb
     >>> blast = cb.simulate("anfo", burden="4 m", ucs=80e6)
     >>> blast.burden_velocity
-    10.1 m s-1 (prediction band 5.7 to 18)
+    10.1 m/s (prediction band 5.7 to 18)
     >>> round(float(blast.near_field.hole_radius[-1]), 3)
     0.133
     """

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from math import pi
 from typing import Literal
 
+from castblast.names import people_unit
+
 Role = Literal["rock", "hole", "bench", "burden_model", "solver", "target", "energy", "diagnostic"]
 
 
@@ -33,7 +35,7 @@ class Variable:
     default : float or None
         Value used when none is given; None: derived from others or always required.
     display_unit : str
-        Unit shown on screens.
+        Unit that people use, in UDUNITS spelling; empty: `unit`.
     display_factor : float
         Value in `display_unit` = value in `unit` times this factor.
     symbol : str
@@ -53,7 +55,12 @@ class Variable:
 
     @property
     def shown_unit(self) -> str:
-        """Unit for screens; the SI unit where no other is usual."""
+        """Unit for screens as people write it (``m/s``); SI where no other unit is usual."""
+        return people_unit(self.file_unit)
+
+    @property
+    def file_unit(self) -> str:
+        """The same unit in UDUNITS spelling (``m s-1``): for heads of tables and for records."""
         return self.display_unit or self.unit
 
     def show(self, value: float) -> str:

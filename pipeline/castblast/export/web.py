@@ -100,7 +100,7 @@ def _facts(network: Network, histories: Mapping[str, Any] | None) -> dict[str, A
             name: {
                 "title": v.long_name.split(";")[0],
                 "unit": v.unit,
-                "shown": v.shown_unit,
+                "shown": v.file_unit,
                 "factor": v.display_factor,
                 "role": v.role,
                 "lower": v.lower,
@@ -149,8 +149,7 @@ def _held_lines(network: Network) -> list[str]:
         variable = VARIABLES.get(name)
         if variable is not None and variable.role != "solver":
             title = variable.long_name.split(";")[0]
-            shown = variable.show(value).replace("kg m-3", "kg/m3").replace("m s-1", "m/s")
-            lines.append(f"{title[0].upper()}{title[1:]}: {shown}")
+            lines.append(f"{title[0].upper()}{title[1:]}: {variable.show(value)}")
     return lines
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from castblast.design.variables import VARIABLES
+from castblast.names import people_unit
 from castblast.network.terms import Activation, Transform
 from castblast.types import FloatArray
 
@@ -39,7 +40,7 @@ class Column:
         """Format an SI value of this column in the unit that people use."""
         if self.name in VARIABLES:
             return VARIABLES[self.name].show(value)
-        return f"{value:.6g} {self.unit}".removesuffix(" 1")
+        return f"{value:.6g} {people_unit(self.unit)}".removesuffix(" 1")
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from castblast.design.variables import VARIABLES, Variable
 from castblast.errors import SpecError, nearest_name
-from castblast.names import shortened
+from castblast.names import people_unit, shortened
 from castblast.specs.units import QuantityError, convert
 from castblast.types import BoolArray, FloatArray
 
@@ -163,7 +163,7 @@ class QuantityIn:
         """Write a value with its unit; angles in degrees."""
         if self.unit == "rad":
             return f"{math.degrees(number):.6g} deg"
-        return f"{number:.6g}" if self.unit == "1" else f"{number:.6g} {self.unit}"
+        return f"{number:.6g}" if self.unit == "1" else f"{number:.6g} {people_unit(self.unit)}"
 
     def __get_pydantic_core_schema__(
         self, source: object, handler: GetCoreSchemaHandler

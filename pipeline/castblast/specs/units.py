@@ -16,7 +16,7 @@ from functools import cache
 from typing import NamedTuple, NoReturn, TypeVar
 
 from castblast.errors import nearest_name
-from castblast.names import shortened
+from castblast.names import people_unit, shortened
 from castblast.types import FloatArray
 
 _BASE = ("m", "s", "kg", "rad")
@@ -247,7 +247,7 @@ def _dimension_name(unit: _Unit) -> str:
 
 def needs(unit: str) -> str:
     """Say in words what a field of this SI unit takes, with an example."""
-    name = _DIMENSIONS.get(unit, f"a quantity in {unit}")
+    name = _DIMENSIONS.get(unit, f"a quantity in {people_unit(unit)}")
     example = _EXAMPLES.get(unit)
     return f"{name} is needed" + (f", such as '{example}'" if example else "")
 

@@ -157,9 +157,9 @@ def _first(faults: list[str]) -> list[str]:
 
 def _heads(found: PredictionTable) -> str:
     columns = (*found.network.inputs, *found.network.outputs)
-    heads = [f"{c.name} [{VARIABLES[c.name].shown_unit}]" for c in columns]
+    heads = [f"{c.name} [{VARIABLES[c.name].file_unit}]" for c in columns]
     bands = [
-        f"{c.name}_prediction_{end} [{VARIABLES[c.name].shown_unit}]"
+        f"{c.name}_prediction_{end} [{VARIABLES[c.name].file_unit}]"
         for c in found.network.outputs
         for end in ("lower", "upper")
     ]

@@ -87,7 +87,7 @@ def test_unknown_name_is_answered_with_the_nearest() -> None:
             ["stemming_length 2 m", "charge_length 11 m", "bench_height of 12.5 m"],
         ),
         ({"ucs": float("nan")}, ["ucs nan MPa", "not plausible"]),
-        ({"rock_density": 2.6}, ["rock_density 2.6 kg m-3", "1000 kg m-3 to 6000 kg m-3"]),
+        ({"rock_density": 2.6}, ["rock_density 2.6 kg/m3", "1000 kg/m3 to 6000 kg/m3"]),
         ({"zones": 3.0}, ["zones 3", "16 to 20000"]),
     ],
 )  # fmt: skip

@@ -40,8 +40,8 @@ def test_tnt_in_tonnes_millimetres_and_seconds(tmp_path: Path) -> None:
     with pytest.raises(SpecError) as caught:
         load_explosive(path)
     assert str(caught.value) == (
-        f"{path}: heat_of_explosion: 4.29e9 mJ/t: implausible (4290 J kg-1); allowed: 100000 to "
-        f"2e+07 J kg-1; 1 MJ/kg is 1 kJ/g or 1e12 mJ/t"
+        f"{path}: heat_of_explosion: 4.29e9 mJ/t: implausible (4290 J/kg); allowed: 100000 to "
+        f"2e+07 J/kg; 1 MJ/kg is 1 kJ/g or 1e12 mJ/t"
     )
     mended = tmp_path / "mended.yaml"
     mended.write_text(path.read_text().replace("4.29e9 mJ/t", "4.29e12 mJ/t"))

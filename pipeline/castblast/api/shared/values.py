@@ -36,7 +36,7 @@ class Quantity(float):
     Examples
     --------
     >>> Quantity("burden_velocity", 12.0)
-    12 m s-1 (prediction band 6.7 to 21)
+    12 m/s (prediction band 6.7 to 21)
     >>> Quantity("burden_velocity", 12.0) / 2
     6.0
     """

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from castblast.dataset.file.schema import HISTORIES, plausible_range, role_of
 from castblast.design.variables import INPUT_NAMES, OUTPUT_NAMES, VARIABLES
 from castblast.errors import Status
+from castblast.names import people_unit
 from castblast.types import BoolArray
 
 #: Roles an input, an output may have.
@@ -108,7 +109,7 @@ class RowCheck:
         self._note(block, name, "not NaN in failed samples", ~ok & ~np.isnan(values), values)
         low, high = plausible_range(name)
         beyond = (values < low - 1e-9 * abs(low)) | (values > high + 1e-9 * abs(high))
-        what = f"implausible; allowed: {low:g} to {high:g} {VARIABLES[name].unit}"
+        what = f"implausible; allowed: {low:g} to {high:g} {people_unit(VARIABLES[name].unit)}"
         self._note(block, name, what, ok & finite & beyond, values)
         bounds = [variable.attrs.get(f"sampled_{end}") for end in ("lower", "upper")]
         numbers = all(isinstance(bound, int | float | np.number) for bound in bounds)

@@ -78,4 +78,4 @@ def _factor(name: str) -> float:
 
 
 def _unit(name: str, unit: str) -> str:
-    return VARIABLES[name].shown_unit if name in VARIABLES else unit
+    return VARIABLES[name].file_unit if name in VARIABLES else unit

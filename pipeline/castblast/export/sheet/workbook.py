@@ -28,6 +28,7 @@ from castblast.export.sheet.design import write_refusals
 from castblast.export.sheet.lookup import lookup_csv
 from castblast.export.source.plain import Files, compact
 from castblast.extras import require
+from castblast.names import people_unit
 from castblast.network import Network
 
 if TYPE_CHECKING:
@@ -169,14 +170,14 @@ def _inputs(document: dict[str, Any], sheet: Worksheet, block: Block, explosives
         sheet.cell(row, 2, column["example"] * factor)
         sheet.cell(row, 3, lower).number_format = "0.####"
         sheet.cell(row, 4, upper).number_format = "0.####"
-        put(sheet, row, 5, column["shown_unit"])
+        put(sheet, row, 5, people_unit(column["shown_unit"]))
         flag = f"Working!${letter(block.offending + i)}${TOP}"
         sheet.cell(row, 6, f'=IF(ISNUMBER($B${row}),IF({flag}=1,"at fault","ok"),"no number")')
         rule = DataValidation(
             type="decimal", operator="between", formula1=repr(lower), formula2=repr(upper)
         )
         rule.errorStyle = "warning"
-        rule.error = f"Trained on {lower:.6g} to {upper:.6g} {column['shown_unit']}."
+        rule.error = f"Trained on {lower:.6g} to {upper:.6g} {people_unit(column['shown_unit'])}."
         sheet.add_data_validation(rule)
         rule.add(f"B{row}")
     for row in (4, *range(INPUT_TOP, INPUT_TOP + len(document["inputs"]))):
@@ -205,7 +206,7 @@ def _results(
                 text = f'IF({state}="outside","unknown",{text})'
             text = f'IF({state}="impossible","no value",{text})'
             sheet.cell(row, i, f"={text}").number_format = "0.0000"
-        put(sheet, row, 5, column["shown_unit"])
+        put(sheet, row, 5, people_unit(column["shown_unit"]))
     bottom = top + 1 + len(document["outputs"])
     sheet.cell(bottom, 1, BAND_SENTENCE)
     sheet.cell(

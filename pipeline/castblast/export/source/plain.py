@@ -107,7 +107,7 @@ def _column(column: Column) -> dict[str, Any]:
         "unit": column.unit,
         # What follows a semicolon tells how specs complete a value: copies complete none.
         "title": variable.long_name.split(";")[0] if variable else column.name.replace("_", " "),
-        "shown_unit": variable.shown_unit if variable else column.unit,
+        "shown_unit": variable.file_unit if variable else column.unit,
         "shown_factor": variable.display_factor if variable else 1.0,
         "log": column.transform == "log",
         "mean": float(column.mean),

@@ -93,7 +93,7 @@ def test_design_for_the_surrogate_takes_the_geometry_of_the_bench(tmp_path: Path
         ({"balls": {"count": 3}}, "balls.count: 3: input should be greater than or equal to 10"),
         (
             {"velocity": "12.7 km/s"},
-            "velocity: 12.7 km/s: implausible (12700 m s-1); allowed: 0 to 100 m s-1",
+            "velocity: 12.7 km/s: implausible (12700 m/s); allowed: 0 to 100 m/s",
         ),
         # A bearing and dips of holes, whichever way they count, are no directions of a throw.
         (

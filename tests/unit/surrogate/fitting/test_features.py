@@ -156,7 +156,7 @@ def test_labels_need_meanings(toy_dataset) -> None:
           "features": ("bench_height", "charge_length", "stemming_length")},
          "spec: derived: length: the sum of bench_height, charge_length, stemming_length is the"),
         ({"targets": ("powder_factor",)},
-         "spec: targets: powder_factor: is 0.5 kg m-3 in every row of the dataset; there is"),
+         "spec: targets: powder_factor: is 0.5 kg/m3 in every row of the dataset; there is"),
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("kind", [RidgeSpec, MlpSpec])
