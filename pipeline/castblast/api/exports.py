@@ -84,7 +84,9 @@ def write_module(fit: Fit, path: Path, *, verify: bool) -> list[Path]:
 
     target = target_of(path)
     if target != "onnx" or not is_torch_model(bare_model(fit.estimator)):
-        message = f"{fit.spec.name}: no chain of dense layers, the target {target} cannot carry it"
+        message = (
+            f"{fit.spec.name}: not a chain of dense layers; the target {target} cannot carry it"
+        )
         raise SpecError(message, field="path", value=str(path), allowed=(".onnx",))
     return [write_bytes(path, module_onnx(fit, verify=verify)[0])]
 

@@ -79,7 +79,7 @@ class Model:
             The model is no chain of dense layers.
         """
         if not isinstance(self._network, Network):
-            message = f"{self.name}: no chain of dense layers, so no network.json can hold it"
+            message = f"{self.name}: not a chain of dense layers, so it has no network.json"
             raise SpecError(message, field="model", value=self.name)
         return self._network
 

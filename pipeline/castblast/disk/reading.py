@@ -55,7 +55,7 @@ def read_bytes(path: Path, kind: str = "file", largest: int = LARGEST_TEXT) -> b
     except OSError as fault:
         raise SpecError(f"{_shown(path)}: cannot be read: {fault.strerror or fault}") from None
     except ValueError:  # a NUL character
-        raise SpecError(f"{_shown(path)}: is no name of a file") from None
+        raise SpecError(f"{_shown(path)}: is not a valid file name") from None
     except MemoryError:
         raise SpecError(f"{_shown(path)}: is too large for the memory of this machine") from None
     if len(content) > largest:
@@ -114,7 +114,7 @@ class _ConstantError(ValueError):
 
 
 def _refuse_constant(name: str) -> NoReturn:
-    message = f"{name} is no number of JSON"
+    message = f"{name} is not a JSON number"
     raise _ConstantError(message)
 
 
@@ -180,7 +180,7 @@ def _read_archive(stream: IO[bytes], size: int) -> dict[str, NDArray[Any]]:
             if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
                 raise _DamageError("packed in a way that NumPy does not write")
             if not entry.filename.endswith(".npy"):
-                raise _DamageError(f"'{printable(entry.filename)[:60]}' in it is no array")
+                raise _DamageError(f"'{printable(entry.filename)[:60]}' in it is not an array")
             name = entry.filename.removesuffix(".npy")
             with archive.open(entry) as part:
                 arrays[name] = _read_array(part, entry.file_size, printable(name)[:60])

@@ -51,7 +51,7 @@ def shell_faults(shell: ShellParts) -> list[str]:
     for entry in shell.inputs:
         least = 0.0 if entry.transform == "log" else -np.inf
         if not least < entry.lower <= entry.upper < np.inf:
-            faults.append(f"{entry.name}: domain {entry.lower!r} to {entry.upper!r} is no range")
+            faults.append(f"{entry.name}: domain {entry.lower!r} to {entry.upper!r} is not a range")
     faults += [
         f"{column.name}: the relative error band must lie between 0 and 100"
         for column in shell.outputs
@@ -131,7 +131,7 @@ def _density_faults(density: DensityScore, inputs: int) -> list[str]:
     if not all(np.isfinite(entry).all() for entry in numbers) or not density.threshold > 0.0:
         return ["density: numbers must be finite, the threshold above 0"]
     if not 0.0 < density.level <= 1.0:
-        return [f"density: level {density.level!r} is no share"]
+        return [f"density: level {density.level!r} is not a share"]
     return []
 
 

@@ -35,11 +35,11 @@ def kind_faults(shell: ShellParts) -> list[str]:
             faults.append(f"explosive '{shortened(name)}': is no name")
     for rule in shell.constraints:
         if not is_label(rule.label):
-            faults.append(f"rule '{shortened(rule.label)}': is no plain text")
+            faults.append(f"rule '{shortened(rule.label)}': is not plain text")
         faults += _numbers(f"rule '{shortened(rule.label)}'", {"lower": rule.lower})
         faults += _coefficient_faults(f"rule '{shortened(rule.label)}'", rule.coefficients)
         if not is_unit(rule.unit):
-            faults.append(f"rule '{shortened(rule.label)}': '{shortened(rule.unit)}' is no unit")
+            faults.append(f"rule '{shortened(rule.label)}': '{shortened(rule.unit)}' is not a unit")
     if not all(isinstance(name, str) for name in shell.golden.explosives):
         faults.append("golden rows: names of explosives are needed")
     if shell.density is not None:
@@ -54,7 +54,7 @@ def _column_faults(column: Column) -> list[str]:
     if not is_variable(column.name):
         faults.append(f"column '{where}': small letters, digits and '_' are allowed in a name")
     if not is_unit(column.unit):
-        faults.append(f"{where}: '{shortened(column.unit)}' is no unit")
+        faults.append(f"{where}: '{shortened(column.unit)}' is not a unit")
     if not isinstance(column.transform, str):
         faults.append(f"{where}: unknown transform '{shortened(column.transform)}'")
     names = ("mean", "scale", "lower", "upper", "relative_band")
@@ -104,7 +104,7 @@ def _provenance_faults(provenance: object) -> list[str]:
         entry = (provenance.get(group, {}) if group else provenance).get(name, "")
         if entry and not is_label(entry):
             place = f"{group}.{name}" if group else name
-            faults.append(f"provenance: {place}: '{shortened(entry)}': is no plain text")
+            faults.append(f"provenance: {place}: '{shortened(entry)}': is not plain text")
     faults += _numbers("provenance: held_inputs", provenance.get("held_inputs", {}))
     scores = provenance.get("scores", {})
     for split, group in scores.items():

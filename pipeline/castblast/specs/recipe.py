@@ -82,7 +82,7 @@ class VariableSpec(Spec):
             message = f"no such input{nearest_name(base, DESIGN_NAMES)}"
             raise ValueError(message)
         if base == name or VARIABLES[base].unit != VARIABLES[name].unit:
-            message = f"{name} is no ratio of {base}: another input of the same unit is needed"
+            message = f"{name} is not a ratio of {base}: another input of the same unit is needed"
             raise ValueError(message)
         return base
 

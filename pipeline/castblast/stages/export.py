@@ -183,13 +183,13 @@ def _export_module(
     if not is_torch_model(model):
         message = (
             f"{name} ({type(model).__name__}): neither a chain of dense layers nor a torch module, "
-            "no target can carry it"
+            "no target can represent it"
         )
         raise SpecError(message)
     others = [target for target in wanted if target != "onnx"]
     if others:
         message = (
-            f"{name}: this torch module is no chain of dense layers, only onnx can carry it, "
+            f"{name}: this torch module is not a chain of dense layers, only onnx can carry it, "
             f"not {', '.join(others)} (--to onnx)"
         )
         raise SpecError(message)

@@ -38,12 +38,12 @@ def torch_core(fit: Fit) -> bytes:
     Raises
     ------
     SpecError
-        The model is no torch module, or holds what `torch.onnx` cannot write in float64 with an
+        The model is not a torch module, or holds what `torch.onnx` cannot write in float64 with an
         operator set that our files may have.
     """
     model = bare_model(fit.estimator)
     if not is_torch_model(model):
-        message = f"{fit.spec.name}: {type(model).__name__} is no torch module"
+        message = f"{fit.spec.name}: {type(model).__name__} is not a torch module"
         raise SpecError(message)
     columns = fit.estimator.regressor_["columns"].transform(fit.table.frame.head(_ROWS))
     example = torch.as_tensor(columns, dtype=torch.float64)

@@ -190,9 +190,9 @@ def test_a_model_that_is_no_network_predicts_too(dataset: xr.Dataset, tmp_path: 
     assert set(answer["domain"]) <= {"inside", "unusual"}
     odd = model.predict({"burden": [4.0, 4.0], "ucs": [8e7, 5e8]}, "anfo")
     assert odd["domain"].tolist()[1] == "outside"
-    with pytest.raises(SpecError, match="no chain of dense layers"):
+    with pytest.raises(SpecError, match="not a chain of dense layers"):
         model.save(tmp_path)
-    with pytest.raises(SpecError, match="no chain of dense layers"):
+    with pytest.raises(SpecError, match="not a chain of dense layers"):
         model.export(tmp_path / "model.onnx")
 
 

@@ -134,7 +134,7 @@ def test_encrypted_and_damaged_archives(tmp_path: Path) -> None:
     _line(fault, path)
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("notes.txt", "hello")
-    with pytest.raises(SpecError, match=r"'notes\.txt' in it is no array"):
+    with pytest.raises(SpecError, match=r"'notes\.txt' in it is not an array"):
         read_npz(path)
     with zipfile.ZipFile(path, "w", zipfile.ZIP_LZMA) as archive:
         archive.writestr("x.npy", _npy(np.ones(3)))
@@ -147,7 +147,7 @@ def test_places_that_are_no_files(tmp_path: Path) -> None:
         read_npz(tmp_path / "none.npz")
     with pytest.raises(SpecError, match="is a folder"):
         read_npz(tmp_path)
-    with pytest.raises(SpecError, match="is no name of a file"):
+    with pytest.raises(SpecError, match="is not a valid file name"):
         read_text(Path("a\0b"))
     with pytest.raises(SpecError, match="cannot be read"):
         read_text(Path("a" * 5000))
@@ -179,8 +179,8 @@ def test_a_text_that_never_ends_is_cut_off(tmp_path: Path) -> None:
         ("[" * 100_000, "nested too deeply"),
         ('{"a":' * 100_000, "nested too deeply"),
         ("9" * 5000, "an integer is too long"),
-        ("[NaN]", "NaN is no number of JSON"),
-        ("[-Infinity]", "-Infinity is no number of JSON"),
+        ("[NaN]", "NaN is not a JSON number"),
+        ("[-Infinity]", "-Infinity is not a JSON number"),
         ('{"a": 1,\n"b" 2}', r"line 2: not JSON"),
         ("", "line 1: not JSON"),
     ],

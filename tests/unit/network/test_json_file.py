@@ -81,7 +81,7 @@ def test_no_times_or_paths_in_the_file(text: str) -> None:
         (lambda d: d["inputs"][0].update(scale=10**400), "scale: an integer of about 400 digits"),
         (lambda d: d["inputs"][0].update(lower=None), "lower: None: a number is needed"),
         (lambda d: d["inputs"][0].update(name="a b"), "column 'a b': small letters"),
-        (lambda d: d["inputs"][0].update(unit="m*/"), "is no unit"),
+        (lambda d: d["inputs"][0].update(unit="m*/"), "is not a unit"),
         (lambda d: d["inputs"][0].update(extra=1), "inputs.0.: 'extra' is unknown"),
         (
             lambda d: d["constraints"].append({"label": "a", "coefficients": [], "lower": 0}),
@@ -89,7 +89,7 @@ def test_no_times_or_paths_in_the_file(text: str) -> None:
         ),
         (
             lambda d: d["constraints"].append({"label": "a*/", "coefficients": {}, "lower": 0}),
-            "is no plain text",
+            "is not plain text",
         ),
         (lambda d: d["golden"].update(explosives=[{}]), "golden.explosives: a list of texts"),
         (lambda d: d.update(density={"centres": [[0.0]]}), "entry .*whitening.* is missing"),

@@ -111,7 +111,7 @@ def test_ends_of_staggered_rows_go_with_their_neighbour(tmp_path: Path) -> None:
         (["-1,1,5"], "x [m],y [m],delay [kg]", "column 'delay [kg]': 'kg' is"),
         (["-1,1"], "x [m],y [m]", "the column 'delay' is missing"),
         (["-1,1,5,99"], "x [m],y [m],delay [ms],burden [m]", "line 2: burden: 99 m: implausible"),
-        ([], HEAD, "holds heads only"),
+        ([], HEAD, "has a header but no data rows"),
     ],
 )
 def test_faulty_holes(tmp_path: Path, lines: list[str], head: str, said: str) -> None:

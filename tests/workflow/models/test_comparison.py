@@ -280,7 +280,7 @@ def test_runs_are_sorted_by_a_metric(whole: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("none",), ("mlflow.db", "no lab book")),
+        (("none",), ("mlflow.db", "no record of runs")),
         (("runs", "--experiment", "toy/2"), ("toy/2", "did you mean 'toy/1'")),
         (("runs", "--stage", "fits"), ("fits", "did you mean 'fit'")),
         (("runs", "--sort", "valid_eror"), ("did you mean 'valid_error'",)),

@@ -249,7 +249,7 @@ def test_a_damaged_journal_is_named(content: bytes, spec, table, tmp_path: Path)
     if content.startswith(b'{"op_code"'):  # nothing but half a record: an empty study
         assert len(tuning.tune(spec, table, journal, trials=1).trials) == 1
         return
-    with pytest.raises(SpecError, match=r"damaged\.journal: is no journal"):
+    with pytest.raises(SpecError, match=r"damaged\.journal: is not a study journal"):
         tuning.tune(spec, table, journal, trials=1)
 
 

@@ -22,7 +22,7 @@ def cast_faults(result: CastResult) -> list[str]:
         faults.append("the energy balance could not be formed")
     elif abs(residual) > MOST_OPEN:
         faults.append(
-            f"the energy balance is open by {_percent(residual)} (allowed: {_percent(MOST_OPEN)})"
+            f"the energy balance is off by {_percent(residual)} (allowed: {_percent(MOST_OPEN)})"
         )
     deep = result.counters.deep_share
     if not deep <= MOST_DEEP:

@@ -172,7 +172,7 @@ def _columns(designs: Table) -> tuple[dict[Any, Any], Any, str]:
         )
     if not isinstance(designs, Mapping):
         message = (
-            f"designs: a {type(designs).__name__} is no table; a DataFrame, a Dataset or a mapping "
+            f"designs: a {type(designs).__name__} is not a table; a DataFrame, Dataset or mapping "
             "of columns is needed"
         )
         raise SpecError(message, field="designs", value=designs)

@@ -80,7 +80,7 @@ def judge(
     first = league["best_exportable"]
     if league["chosen"] is None and extent.always_choose:
         league["chosen"] = first
-        remarks.append(f"no model passes the physics gate; {first} is taken all the same")
+        remarks.append(f"no model passes the physics gate; {first} is selected anyway")
     first = league["chosen"] or first
     chosen = next(fit for fit in fits if fit.spec.name == first)
     known = dataset if domain else None

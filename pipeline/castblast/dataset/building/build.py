@@ -33,7 +33,7 @@ IN_FLIGHT = 3
 _CONNECT_SECONDS = 10
 _COUNT_SECONDS = 5.0
 _RETRIES = 2
-_GONE = "the scheduler went away; finished shards are kept: run the same command again to go on"
+_GONE = "the scheduler went away; finished shards are kept: run the same command again to resume"
 
 
 def build_shards(

@@ -119,7 +119,9 @@ class Work:
             yield self._read(span)
             end = span.end
         if end != len(self.status):
-            message = f"{self.folder}: the shard from row {end} on is missing; run the same again"
+            message = (
+                f"{self.folder}: the shard from row {end} on is missing; run the same command again"
+            )
             raise DatasetError(message)
 
     def _read(self, span: Span) -> BatchResult:

@@ -221,7 +221,7 @@ def _require_format(dataset: xr.Dataset, path: Path) -> None:
         # They go into every model that is trained on it, and from there into source code.
         if not is_label(dataset.attrs.get(key, "none")):
             shown = shortened(dataset.attrs[key])
-            message = f"{path}: attribute {key}: '{shown}' is no plain text"
+            message = f"{path}: attribute {key}: '{shown}' is not plain text"
             raise DatasetError(message)
 
 

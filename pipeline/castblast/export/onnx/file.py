@@ -328,7 +328,7 @@ def run_onnx_rows(model: bytes, numeric: FloatArray, index: IntArray) -> Answers
             message = f"onnxruntime does not run the file: {str(fault).splitlines()[0]}"
             raise CheckError(message) from fault
     if any(len(column) != len(numeric) for column in columns):
-        message = f"the file does not answer {len(numeric)} rows, only a number fixed in it"
+        message = f"the file has a fixed batch size and cannot take {len(numeric)} rows"
         raise CheckError(message)
     found = dict(zip(names, columns, strict=True))
     outputs = [name.removesuffix(_ENDS[0]) for name in names if name.endswith(_ENDS[0])]

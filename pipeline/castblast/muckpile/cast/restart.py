@@ -67,8 +67,8 @@ class Keeper:
     def how_to_go_on(self) -> str:
         """What a user who stopped the run may do, in words."""
         if self.path is None:
-            return "nothing of it is kept"
-        return f"its state is kept in {self.path}; run the same command again to go on"
+            return "nothing is kept"
+        return f"its state is kept in {self.path}; run the same command again to resume"
 
     def read(self) -> Arrays | None:
         """State to go on from; None: begin anew.

@@ -139,7 +139,7 @@ def _shape_faults(polygons: tuple[OrePolygon, ...], bench: Bench | None) -> list
         shape = shapely.Polygon(polygon.corners)
         if not shape.is_valid or shape.area == 0.0:
             reason = shapely.is_valid_reason(shape) if shape.convex_hull.area else "no area"
-            faults.append(f"'{polygon.name}': is no simple polygon ({reason})")
+            faults.append(f"'{polygon.name}': is not a simple polygon ({reason})")
             continue
         shapes.append((polygon.name, shape))
         if bench is not None and not shape.intersects(_plan(bench)):

@@ -141,7 +141,7 @@ class SurrogateSpec(Spec):
                 faults.append(f"derived: '{column}' is the name of a variable; take another")
             missing = [name for name in entry.coefficients if features and name not in features]
             faults += [
-                f"derived: {column}: '{name}' is no feature of this spec" for name in missing
+                f"derived: {column}: '{name}' is not a feature of this spec" for name in missing
             ]
         if faults:
             raise ValueError("; ".join(faults))

@@ -97,7 +97,7 @@ def make_model_spec(content: Any, where: str, folder: Path) -> ModelSpec:
         Unknown family, unknown or unusable settings; all faults at once.
     """
     if not isinstance(content, Mapping):
-        message = f"{where}: is no spec of a model"
+        message = f"{where}: is not a model spec"
         raise SpecError(message)
     kind = content.get("kind")
     if not isinstance(kind, str) or kind not in _KINDS:

@@ -214,7 +214,7 @@ def with_unit_row(path: Path, form: Form, heads: list[Head], rows: Rows) -> Rows
     """Take units from a second row of heads, if there is one."""
     first = next(rows, None)
     if first is None:
-        raise SpecError(f"{path}: holds heads only; at least one row is needed")
+        raise SpecError(f"{path}: has a header but no data rows")
     line, cells = first
     numbers = [
         (head, cells[k].strip().strip("[]()").strip())

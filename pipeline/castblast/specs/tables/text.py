@@ -131,7 +131,7 @@ def decode(path: Path, data: bytes) -> str:
         for encoding, zeros in (("utf-16-le", start[1::2]), ("utf-16-be", start[0::2])):
             if zeros.count(0) > 0.7 * len(zeros):
                 return _decoded(path, data, encoding)
-        raise SpecError(f"{path}: holds bytes that are no text; {_ENCODING_REMEDY}")
+        raise SpecError(f"{path}: holds bytes that are not text; {_ENCODING_REMEDY}")
     try:
         return _decoded(path, data, "utf-8")
     except SpecError:
@@ -145,7 +145,7 @@ def _decoded(path: Path, data: bytes, encoding: str) -> str:
         name = "UTF-8 or Windows-1252" if encoding == "cp1252" else encoding.upper()
         raise SpecError(f"{path}: is not a text file in {name}; {_ENCODING_REMEDY}") from None
     if "\0" in text:
-        raise SpecError(f"{path}: holds bytes that are no text; {_ENCODING_REMEDY}")
+        raise SpecError(f"{path}: holds bytes that are not text; {_ENCODING_REMEDY}")
     return text
 
 

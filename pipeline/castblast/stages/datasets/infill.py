@@ -147,7 +147,7 @@ def _find_model(model: Path) -> Network | ModelSpec:
     try:
         return make_model_spec(network.provenance.get("spec"), f"{path}: spec", path.parent)
     except SpecError:
-        message = f"{path}: has no members and no usable spec; give the model spec (YAML) instead"
+        message = f"{path}: has no members and no usable spec; pass the model spec (YAML) instead"
         raise SpecError(message) from None
 
 

@@ -109,9 +109,9 @@ class Frames:
         kinds = str(arrays.get(_KINDS, ""))
         if kinds != self._kinds:
             message = (
-                f"{self._folder.parent}: the run that was stopped took other frames "
-                f"({kinds or 'none'}) than now asked for ({self._kinds}); give the same options, "
-                f"or remove its restart file to start from the beginning"
+                f"{self._folder.parent}: the stopped run kept other frames "
+                f"({kinds or 'none'}) than are requested now ({self._kinds}); give the same "
+                f"options, or remove its restart file to start from the beginning"
             )
             raise SpecError(message)
         for taker in (self._film, self._series):

@@ -195,7 +195,7 @@ def _require_same(before: Particles, after: Particles, start: Path, final: Path)
         k = int(np.argmax(other))
         message = (
             f"{final}: ball {k} has a radius of {after.radius[k]:.4g} m, in {start} "
-            f"{before.radius[k]:.4g} m: the order is another, or the balls are"
+            f"{before.radius[k]:.4g} m: the order differs, or these are other balls"
         )
         raise SpecError(message)
 

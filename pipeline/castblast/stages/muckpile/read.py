@@ -84,10 +84,10 @@ def _read_metrics(path: Path) -> tuple[dict[str, Any], Bench]:
         raise _foreign(path, f"{missing[0]}: is missing")
     for name in UNITS:
         if not _is_numbers(document[name]):
-            raise _foreign(path, f"{name}: holds something else than numbers")
+            raise _foreign(path, f"{name}: holds something other than numbers")
     told = document.get("faults", [])
     if not isinstance(told, list) or not all(isinstance(fault, str) for fault in told):
-        raise _foreign(path, "faults: holds something else than texts")
+        raise _foreign(path, "faults: holds something other than texts")
     return document, _read_geometry(path, document.get("geometry"))
 
 

@@ -187,7 +187,7 @@ def _outcome(result: StudyResult, folder: Path, journal: Path) -> Outcome:
     lines += [f"failed: {remark}" for remark in remarks[:3]]
     lines += [
         f"wrote {folder / f'{result.spec.name}.yaml'}",
-        f"the same command with more --trials goes on from {journal}",
+        f"run the same command with more --trials to resume from {journal}",
     ]
     document = {**study_document(result), "out": str(folder), "journal": str(journal)}
     return Outcome(

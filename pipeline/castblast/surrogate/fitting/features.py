@@ -223,7 +223,7 @@ def _labels(variable: xr.DataArray) -> NDArray[np.str_]:
     meanings = str(variable.attrs.get("flag_meanings", "")).split()
     values = variable.to_numpy()
     if not np.issubdtype(values.dtype, np.integer) or not meanings:
-        message = f"{variable.name}: is no flag variable (integers with flag_meanings)"
+        message = f"{variable.name}: is not a flag variable (integers with flag_meanings)"
         raise DatasetError(message)
     if values.size and not 0 <= values.min() <= values.max() < len(meanings):
         message = f"{variable.name}: a value has no entry in flag_meanings ({' '.join(meanings)})"

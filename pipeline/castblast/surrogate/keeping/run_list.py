@@ -57,7 +57,7 @@ def read_runs(store: Path, experiment: str | None = None) -> list[RunEntry]:
         No such file, none of MLflow, or no such experiment.
     """
     if not store.is_file():
-        message = f"{store}: there is no lab book; castblast train, tune and compare write one"
+        message = f"{store}: no record of runs; castblast train, tune and compare write one"
         raise SpecError(message)
     _require_store(store)
     with open_store(store.resolve()) as mlflow:

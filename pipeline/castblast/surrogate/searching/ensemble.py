@@ -38,7 +38,7 @@ def fit_members(
         message = f"{spec.name}: family '{spec.kind}' has no random start; take one with a seed"
         raise SpecError(message)
     if count < 2:
-        message = f"members: {count} is too few to disagree; allowed: 2 or more"
+        message = f"members: {count}; an ensemble needs at least two members"
         raise SpecError(message)
     return [
         fit_spec(

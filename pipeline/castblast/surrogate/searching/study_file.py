@@ -65,10 +65,10 @@ def _mend(journal: Path) -> None:
         *lines, rest = stream.read().split(b"\n")
         for number, line in enumerate(lines, start=1):
             if not _is_record(line):
-                message = f"{journal}: is no journal of a study, or a damaged one (line {number})"
+                message = f"{journal}: is not a study journal, or is damaged (line {number})"
                 raise SpecError(message)
         if not rest.startswith(_RECORD[: len(rest)]):
-            message = f"{journal}: is no journal of a study, or a damaged one (its end)"
+            message = f"{journal}: is not a study journal, or is damaged (its end)"
             raise SpecError(message)
         stream.truncate(sum(len(line) + 1 for line in lines))
 

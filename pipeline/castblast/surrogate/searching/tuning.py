@@ -213,7 +213,7 @@ def _open_study(optuna: Any, journal: Path, identity: Mapping[str, str]) -> Any:
     except (
         ValueError, KeyError, TypeError, AttributeError, AssertionError, RecursionError,
     ) as fault:  # fmt: skip
-        message = f"{journal}: is no journal of a study, or a damaged one ({type(fault).__name__})"
+        message = f"{journal}: is not a study journal, or is damaged ({type(fault).__name__})"
         raise SpecError(message) from None
     if not names:
         study = optuna.create_study(storage=storage, study_name=_STUDY, direction="minimize")
@@ -351,7 +351,7 @@ def _result(optuna: Any, study: Any, spec: ModelSpec, identity: Mapping[str, str
     best = best_trial(records)
     if best is None:
         remarks = [record.remark for record in records if record.remark]
-        what = f"no trial could be fitted; the first says: {remarks[0]}" if remarks else "no trial"
+        what = f"no trial could be fitted; the first error: {remarks[0]}" if remarks else "no trial"
         message = f"{spec.name}: {what}"
         raise SpecError(message)
     tuned = candidate(spec, best.settings, f"{spec.name}_tuned")

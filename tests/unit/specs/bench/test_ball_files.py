@@ -57,7 +57,7 @@ def test_the_same_balls_in_any_form(name: str, apart: float) -> None:
         ("q13_dup.csv", "lines 2 and 252: two balls at one place"),
         ("q21_fortran_d.csv", "line 2: x: -5.5000D+00: a number is needed; write its exponent"),
         ("q23_single.npy", "is an array of NumPy (.npy), which has no names"),
-        ("q6_packing.xyzd", "holds bytes that are no text; save it as UTF-8"),
+        ("q6_packing.xyzd", "holds bytes that are not text; save it as UTF-8"),
     ],
 )
 def test_what_is_not_read_is_said(name: str, line: str) -> None:

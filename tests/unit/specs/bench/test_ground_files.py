@@ -146,8 +146,8 @@ def test_damaged_stl_files_are_one_line(tmp_path):
         "words.stl": (text.replace(b"vertex 1", b"vertex one", 1), ""),
         "bad.stl": (b"solid nothing\n", ""),
         "none.stl": (b"solid a\nendsolid a\n", "holds no facet"),
-        "empty.stl": (b"", "is no STL file: 0 bytes"),
-        "zip.stl": (b"PK" + bytes(200), "is no STL file"),
+        "empty.stl": (b"", "is not an STL file: 0 bytes"),
+        "zip.stl": (b"PK" + bytes(200), "is not an STL file"),
     }
     for name, (content, words) in cases.items():
         (tmp_path / name).write_bytes(content)

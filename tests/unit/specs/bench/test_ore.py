@@ -64,7 +64,7 @@ def square(x: float, name: str = "a") -> str:
         ("polygons:\n" + square(7), "'a': lies beside the bench, which has x from -24 to 0 m"),
         (
             "polygons:\n  - {name: a, corners: [[-4, 0], [-2, 2], [-2, 0], [-4, 2]]}",
-            "'a': is no simple polygon (Self-intersection",
+            "'a': is not a simple polygon (Self-intersection",
         ),
         ("polygons:\n  - {name: a, corners: [[-4, 0], [-3, 0], [-2, 0]]}", "(no area)"),
         (
@@ -93,7 +93,7 @@ def test_faults_of_yaml(tmp_path: Path, text: str, line: str) -> None:
         ("name,x,y\na,-1,", "line 2: y: empty: a number is needed"),
         ("name,x,y\na,-1", "line 2: 2 cells for 3 heads"),
         ("name,x,y,grade\na,-1,0,1\na,-2,0,2\na,-2,1,1", "line 3: grade: 'a' has another grade"),
-        ("name,x,y\n", "holds heads only"),
+        ("name,x,y\n", "has a header but no data rows"),
         ("", "is empty"),
     ],
 )

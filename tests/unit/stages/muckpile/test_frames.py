@@ -106,7 +106,7 @@ def test_a_stopped_run_goes_on_with_its_frames(tmp_path: Path) -> None:
 def test_other_frames_than_those_of_the_stopped_run_are_refused(tmp_path: Path) -> None:
     frames = Frames(tmp_path, case(), BENCH, animation="gif")
     with pytest.raises(
-        SpecError, match=r"took other frames \(none\) than now asked for \(animation"
+        SpecError, match=r"kept other frames \(none\) than are requested now \(animation"
     ):
         frames.resume({})
     kept = frames.save() | {"frames.time": np.array([0.0, 0.1])}

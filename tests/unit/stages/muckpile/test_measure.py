@@ -106,6 +106,6 @@ def test_other_balls_are_refused(bench: Path, tmp_path: Path) -> None:
     with pytest.raises(SpecError, match=r"249 balls; .* has 250: all of them are needed"):
         measure_muckpile(bench, final, tmp_path / "out")
     final = dump_of(tmp_path, start.position, np.roll(start.radius, 1), np.arange(250))
-    with pytest.raises(SpecError, match=r"ball 0 has a radius of .* m: the order is another"):
+    with pytest.raises(SpecError, match=r"ball 0 has a radius of .* m: the order differs"):
         measure_muckpile(bench, final, tmp_path / "out")
     assert not (tmp_path / "out").exists()

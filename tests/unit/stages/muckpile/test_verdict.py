@@ -45,7 +45,7 @@ def test_an_open_energy_balance(tmp_path: Path, capsys: pytest.CaptureFixture[st
     out = tmp_path / "out"
     code = main(["muckpile", str(written(tmp_path)), "--out", str(out), "--quiet"])
     assert code == 4
-    line = "not ok: the energy balance is open by -2.2e+03 % (allowed: 1 %)\n"
+    line = "not ok: the energy balance is off by -2.2e+03 % (allowed: 1 %)\n"
     assert capsys.readouterr().err == line
     document = json.loads((out / "metrics.json").read_text())
     assert document["ok"] is False

@@ -142,7 +142,7 @@ def test_an_explosive_without_training_rows_is_a_fault(toy_dataset) -> None:
 def test_labels_need_meanings(toy_dataset) -> None:
     dataset = toy_dataset(600)
     del dataset["split"].attrs["flag_meanings"]
-    with pytest.raises(DatasetError, match="split: is no flag variable"):
+    with pytest.raises(DatasetError, match="split: is not a flag variable"):
         read_table(dataset, PAPER_FEATURES, PAPER_TARGETS)
 
 

@@ -189,7 +189,7 @@ def test_shipped_specs_are_read(repository: Path) -> None:
         ("kind: ridge\nfeatures: al\n", "features"),
         ("kind: ridge\nderived: {x: {coefficients: {ucs: 1, burden: 1}}}\n", "different units"),
         ("kind: ridge\nderived: {x: {coefficients: {uc: 1}}}\n", "did you mean 'ucs'"),
-        ("kind: ridge\nderived: {x: {coefficients: {spacing: 1}}}\n", "is no feature"),
+        ("kind: ridge\nderived: {x: {coefficients: {spacing: 1}}}\n", "is not a feature"),
         ("kind: ridge\nderived: {ucs: {coefficients: {ucs: 1}}}\n", "name of a variable"),
         ("kind: ridge\nlinear_features: [spacing]\n", "linear_features: unknown"),
     ],

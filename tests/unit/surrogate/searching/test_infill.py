@@ -106,5 +106,5 @@ def test_restarts_that_were_not_chosen_can_travel(table) -> None:
 def test_what_cannot_be_an_ensemble_is_refused(table) -> None:
     with pytest.raises(SpecError, match=r"ridge.*has no random start"):
         fit_members(RidgeSpec(name="ridge"), table, 3)
-    with pytest.raises(SpecError, match="members: 1 is too few"):
+    with pytest.raises(SpecError, match="members: 1; an ensemble needs"):
         fit_members(QUICK, table, 1)

@@ -96,11 +96,11 @@ def _last_line(data: bytes) -> bytes:
 
 def _damage(data: bytes, stated: int) -> str:
     if stated < 0:
-        return f"is no STL file: {len(data)} bytes; a binary one has at least {_HEADER}"
+        return f"is not an STL file: {len(data)} bytes; a binary one has at least {_HEADER}"
     needed = _HEADER + _RECORD * stated
     return (
-        f"is no STL file, or a damaged one: {stated:,} facets stated take {needed:,} bytes, it has "
-        f"{len(data):,}"
+        f"is not an STL file, or is damaged: {stated:,} facets stated take {needed:,} bytes, "
+        f"it has {len(data):,}"
     )
 
 
@@ -122,7 +122,7 @@ def _parsed(path: Path, data: bytes) -> FloatArray:
         return np.asarray(mesh.triangles, dtype=np.float64).reshape(-1, 3, 3)
     except Exception as fault:  # trimesh raises whatever its parsers raise
         line = (str(fault).splitlines() or [type(fault).__name__])[0]
-        raise SpecError(f"{path}: is no readable STL file ({line})") from None
+        raise SpecError(f"{path}: is not a readable STL file ({line})") from None
 
 
 def single_precision_remark(values: FloatArray, factor: float = 1.0) -> str:
