@@ -35,6 +35,9 @@ MAX_STEPS: Final = 6000
 _WORTH_LOCATING: Final = 1e3
 #: First step after an event over the step that was tried when it came.
 _RESTART: Final = 0.7
+#: Columns of `Path.phases`.
+VENTING: Final = 0
+PLUGGED: Final = 1
 
 
 class Path(NamedTuple):
@@ -69,8 +72,8 @@ def _record(path: Path, point: int, phase: Phase, time: float, state: FloatArray
     path.times[point] = time
     for i in range(CORE_SIZE):
         path.states[point, i] = state[i]
-    path.phases[point, 0] = phase.venting
-    path.phases[point, 1] = phase.plugged
+    path.phases[point, VENTING] = phase.venting
+    path.phases[point, PLUGGED] = phase.plugged
 
 
 @lean_kernel

@@ -22,7 +22,7 @@ from castblast.burden.balance import (
 )
 from castblast.burden.case import BurdenBatch
 from castblast.burden.geometry import pressurised_plane
-from castblast.burden.integrator import Path
+from castblast.burden.integrator import PLUGGED, VENTING, Path
 from castblast.burden.runge_kutta import REACHED_VELOCITY, Phase, Work, step_to_event, take_step
 from castblast.burden.venting import ATMOSPHERIC_PRESSURE
 from castblast.explosive.isentrope import energy, pressure
@@ -33,6 +33,8 @@ from castblast.types import FloatArray
 LEDGER_TOLERANCE: Final = 1e-6
 #: Acceleration counts as over at this share of the final velocity.
 _ACCELERATED: Final = 0.95
+# Rows of a history.
+_HISTORY_TIME, _HISTORY_PRESSURE, _HISTORY_VELOCITY, _HISTORY_DISPLACEMENT = 0, 1, 2, 3
 
 
 @kernel
@@ -84,7 +86,7 @@ def summarise(
 @kernel
 def _restart(b: Balance, i: int, path: Path, work: Work) -> Phase:
     """Go back to point `i` of the path."""
-    phase = Phase(path.phases[i, 0], path.phases[i, 1])
+    phase = Phase(path.phases[i, VENTING], path.phases[i, PLUGGED])
     work.state[:CORE_SIZE] = path.states[i]
     rates(b, phase.venting, phase.plugged, path.times[i], work.state, work.stages[0])
     return phase
@@ -123,7 +125,8 @@ def write_history(b: Balance, path: Path, steps: int, work: Work, history: Float
         i = steps if j == n - 1 else np.searchsorted(times, time, side="right") - 1
         phase = _restart(b, i, path, work)
         take_step(b, phase, times[i], time - times[i], work)
-        history[0, j] = time
-        history[1, j] = pressure(b.isentrope, relative_volume(b, time, work.new_state))
-        history[2, j] = work.new_state[VELOCITY]
-        history[3, j] = work.new_state[DISPLACEMENT]
+        volume = relative_volume(b, time, work.new_state)
+        history[_HISTORY_TIME, j] = time
+        history[_HISTORY_PRESSURE, j] = pressure(b.isentrope, volume)
+        history[_HISTORY_VELOCITY, j] = work.new_state[VELOCITY]
+        history[_HISTORY_DISPLACEMENT, j] = work.new_state[DISPLACEMENT]

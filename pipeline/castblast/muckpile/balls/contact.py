@@ -28,6 +28,19 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from castblast.kernel import inline_kernel
+from castblast.muckpile.balls.columns import (
+    DAMPING,
+    ROLL_X,
+    ROLL_Y,
+    ROLL_Z,
+    SHEAR_X,
+    SHEAR_Y,
+    SHEAR_Z,
+    STIFFNESS,
+    X,
+    Y,
+    Z,
+)
 from castblast.types import RealArray
 
 Vector: TypeAlias = tuple[float, float, float]
@@ -199,10 +212,10 @@ def close_contact(
     """Begin the memory of contact `p`: k_n `stiffness` [N m-1], m_c `mass` [kg], no load yet."""
     for word in range(6):
         memory[p, word] = 0.0
-    memory[p, 6] = stiffness
-    memory[p, 7] = 2.0 * sqrt(mass * stiffness)
+    memory[p, STIFFNESS] = stiffness
+    memory[p, DAMPING] = 2.0 * sqrt(mass * stiffness)
     if len(dash) > 0:
-        dash[p, 0], dash[p, 1], dash[p, 2] = 0.0, 0.0, 0.0
+        dash[p, X], dash[p, Y], dash[p, Z] = 0.0, 0.0, 0.0
 
 
 @inline_kernel
@@ -210,9 +223,9 @@ def spring_energy(
     memory: RealArray, p: int, overlap: float, effective_radius: float, shear_ratio: float
 ) -> float:
     """Elastic energy [J] of contact `p`: normal, shear and rolling spring."""
-    kn = float(memory[p, 6])
-    shear = float(memory[p, 0] ** 2 + memory[p, 1] ** 2 + memory[p, 2] ** 2)
-    moment = float(memory[p, 3] ** 2 + memory[p, 4] ** 2 + memory[p, 5] ** 2)
+    kn = float(memory[p, STIFFNESS])
+    shear = float(memory[p, SHEAR_X] ** 2 + memory[p, SHEAR_Y] ** 2 + memory[p, SHEAR_Z] ** 2)
+    moment = float(memory[p, ROLL_X] ** 2 + memory[p, ROLL_Y] ** 2 + memory[p, ROLL_Z] ** 2)
     bent = shear + moment / (effective_radius * effective_radius)
     return 0.5 * (kn * overlap * overlap + bent / (kn * shear_ratio))
 

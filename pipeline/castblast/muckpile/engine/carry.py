@@ -13,6 +13,7 @@ from numba import prange
 from numpy.typing import NDArray
 
 from castblast.kernel import lean_kernel, parallel_kernel
+from castblast.muckpile.balls.columns import DAMPING, STIFFNESS
 from castblast.muckpile.balls.contact import ROW
 from castblast.muckpile.balls.state import Contacts, starts
 from castblast.muckpile.search.neighbours import PIECES
@@ -148,7 +149,8 @@ def _restore_piece(
                     touching[p] = 1
                     for word in range(ROW - 2):
                         rows[p, word] = sign * kept_rows[m, word]
-                    rows[p, 6], rows[p, 7] = kept_rows[m, 6], kept_rows[m, 7]
+                    rows[p, STIFFNESS] = kept_rows[m, STIFFNESS]
+                    rows[p, DAMPING] = kept_rows[m, DAMPING]
                     if with_dash:
                         for word in range(3):
                             dash[p, word] = sign * kept_dash[m, word]

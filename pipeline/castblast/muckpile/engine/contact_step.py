@@ -10,6 +10,21 @@ from __future__ import annotations
 from math import sqrt
 
 from castblast.kernel import fused_kernel, inline_kernel
+from castblast.muckpile.balls.columns import (
+    DASHPOT,
+    ROLL_X,
+    ROLL_Y,
+    ROLL_Z,
+    ROLLING_SLIP,
+    SHEAR_X,
+    SHEAR_Y,
+    SHEAR_Z,
+    SLIP,
+    STIFFNESS,
+    X,
+    Y,
+    Z,
+)
 from castblast.muckpile.balls.contact import Constants, Vector
 from castblast.types import FloatArray, RealArray
 
@@ -207,8 +222,10 @@ def book_step(
             shear[1] + dashpot[1] - along * normal[1],
             shear[2] + dashpot[2] - along * normal[2],
         )
-    work[w, 0] += _slip_work(turned, held, cut, length, ks)
-    work[w, 1] += _slip_work(bent, moment, roll_cut, roll_length, ks * effective * effective)
+    work[w, SLIP] += _slip_work(turned, held, cut, length, ks)
+    work[w, ROLLING_SLIP] += _slip_work(
+        bent, moment, roll_cut, roll_length, ks * effective * effective
+    )
     book_dashpot(work, w, dash, p, step, slide, dashpot)
     for axis in range(3):
         dash[p, axis] = dashpot[axis]
@@ -219,9 +236,9 @@ def book_dashpot(
     work: FloatArray, w: int, dash: RealArray, p: int, step: float, slide: Vector, now: Vector
 ) -> None:
     """Book the work of the dashpots of contact `p`, whose force is `now` [N]."""
-    before = dash[p, 0] * slide[0] + dash[p, 1] * slide[1] + dash[p, 2] * slide[2]
+    before = dash[p, X] * slide[0] + dash[p, Y] * slide[1] + dash[p, Z] * slide[2]
     after = now[0] * slide[0] + now[1] * slide[1] + now[2] * slide[2]
-    work[w, 2] -= 0.5 * step * (before + after)
+    work[w, DASHPOT] -= 0.5 * step * (before + after)
 
 
 @inline_kernel
@@ -241,11 +258,13 @@ def book_opening(
     The springs hold almost nothing then, because their limits fell to zero with the normal force;
     what the last step left in them counts as slip.
     """
-    ks = memory[p, 6] * shear_ratio
-    work[w, 0] += (memory[p, 0] ** 2 + memory[p, 1] ** 2 + memory[p, 2] ** 2) / (2.0 * ks)
-    work[w, 1] += (memory[p, 3] ** 2 + memory[p, 4] ** 2 + memory[p, 5] ** 2) / (
-        2.0 * ks * effective * effective
-    )
+    ks = memory[p, STIFFNESS] * shear_ratio
+    work[w, SLIP] += (
+        memory[p, SHEAR_X] ** 2 + memory[p, SHEAR_Y] ** 2 + memory[p, SHEAR_Z] ** 2
+    ) / (2.0 * ks)
+    work[w, ROLLING_SLIP] += (
+        memory[p, ROLL_X] ** 2 + memory[p, ROLL_Y] ** 2 + memory[p, ROLL_Z] ** 2
+    ) / (2.0 * ks * effective * effective)
     book_dashpot(work, w, dash, p, step, slide, (0.0, 0.0, 0.0))
 
 

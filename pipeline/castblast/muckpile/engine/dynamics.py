@@ -18,6 +18,23 @@ from numba import prange
 from numpy.typing import NDArray
 
 from castblast.kernel import inline_kernel, lean_kernel, parallel_kernel
+from castblast.muckpile.balls.columns import (
+    FX,
+    FY,
+    FZ,
+    HELD,
+    MASS,
+    MX,
+    MY,
+    MZ,
+    RADIUS,
+    VX,
+    VY,
+    VZ,
+    WX,
+    WY,
+    WZ,
+)
 from castblast.muckpile.balls.contact import Constants
 from castblast.muckpile.balls.state import Balls, Contacts
 from castblast.muckpile.engine.pair_forces import BLOCK_NAMES, BLOCK_NUMBERS, pair_forces
@@ -60,12 +77,12 @@ def _kick(
     motion: RealArray, force: RealArray, i: int, light: float, spin: float, fall: float
 ) -> None:
     """Half a step of acceleration: half step over mass, over moment of inertia, and g times it."""
-    motion[i, 0] += force[i, 0] * light
-    motion[i, 1] += force[i, 1] * light
-    motion[i, 2] += force[i, 2] * light - fall
-    motion[i, 3] += force[i, 3] * spin
-    motion[i, 4] += force[i, 4] * spin
-    motion[i, 5] += force[i, 5] * spin
+    motion[i, VX] += force[i, FX] * light
+    motion[i, VY] += force[i, FY] * light
+    motion[i, VZ] += force[i, FZ] * light - fall
+    motion[i, WX] += force[i, MX] * spin
+    motion[i, WY] += force[i, MY] * spin
+    motion[i, WZ] += force[i, MZ] * spin
 
 
 @inline_kernel
@@ -85,7 +102,7 @@ def _drift(
         straight = paths[axis, i] + paths[axis + 3, i] * elapsed
         off += (place[i, axis] - straight) ** 2
         force[i, axis] = 0.0
-        force[i, axis + 3] = 0.0
+        force[i, axis + MX] = 0.0
     return off
 
 
@@ -114,10 +131,10 @@ def _do_balls(
     touching, dash = touches.touching, touches.dash
     largest = 0.0
     for i in range(first, last):
-        if motion[i, 7] != 0.0:
+        if motion[i, HELD] != 0.0:
             continue
-        per_mass = 0.5 / motion[i, 6]
-        per_inertia = per_mass / (0.4 * place[i, 3] * place[i, 3])
+        per_mass = 0.5 / motion[i, MASS]
+        per_inertia = per_mass / (0.4 * place[i, RADIUS] * place[i, RADIUS])
         if pending >= 0.0:
             if start[i] < start[i + 1]:
                 wall_forces(

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from castblast.kernel import fused_kernel, inline_kernel, lean_kernel
+from castblast.muckpile.balls.columns import MASS, MX, RADIUS, WX, X, Y, Z
 from castblast.muckpile.balls.contact import Constants, ball_stiffness, close_contact
 from castblast.muckpile.balls.state import Balls, Contacts
 from castblast.muckpile.engine.contact_step import book_opening, book_step, step_contact
@@ -127,11 +128,11 @@ def _lay_out(
 
     A contact that has opened gets no stiffness, so that nothing comes of it.
     """
-    block[q + _RADIUS], block[q + _OTHER] = place[i, 3], place[j, 3]
+    block[q + _RADIUS], block[q + _OTHER] = place[i, RADIUS], place[j, RADIUS]
     for axis in range(3):
         block[q + _SLIDE + axis * BLOCK] = motion[j, axis] - motion[i, axis]
-        block[q + _SPIN + axis * BLOCK] = motion[i, axis + 3]
-        block[q + _OTHER_SPIN + axis * BLOCK] = motion[j, axis + 3]
+        block[q + _SPIN + axis * BLOCK] = motion[i, axis + WX]
+        block[q + _OTHER_SPIN + axis * BLOCK] = motion[j, axis + WX]
     if block[q + _GAP] <= 0.0:
         if touching[p] and len(dash) > 0:
             _book_opening(block, q, memory, dash, p, law, step, work, w)
@@ -141,8 +142,8 @@ def _lay_out(
         return
     if not touching[p]:
         touching[p] = 1
-        mass = motion[i, 6] * motion[j, 6] / (motion[i, 6] + motion[j, 6])
-        stiffness = ball_stiffness(place[i, 3], place[j, 3], law.modulus)
+        mass = motion[i, MASS] * motion[j, MASS] / (motion[i, MASS] + motion[j, MASS])
+        stiffness = ball_stiffness(place[i, RADIUS], place[j, RADIUS], law.modulus)
         close_contact(memory, dash, p, stiffness, mass)
     for word in range(8):
         block[q + _SHEAR + word * BLOCK] = memory[p, word]
@@ -200,8 +201,8 @@ def _give_back(
             push = block[q + _FORCE + axis * BLOCK]
             force[i, axis] -= push
             force[j, axis] += push
-            force[i, axis + 3] -= block[q + _ARM + axis * BLOCK]
-            force[j, axis + 3] += block[q + _OTHER_ARM + axis * BLOCK]
+            force[i, axis + MX] -= block[q + _ARM + axis * BLOCK]
+            force[j, axis + MX] += block[q + _OTHER_ARM + axis * BLOCK]
         for word in range(6):
             memory[p, word] = block[q + _SHEAR + word * BLOCK]
         if len(dash) > 0:
@@ -279,11 +280,11 @@ def pair_forces(
     base, name, count = b * BLOCK_NUMBERS, b * BLOCK_NAMES, 0
     blocks[base + _STEP] = step
     for i in range(first, last):
-        x, y, z, radius = place[i, 0], place[i, 1], place[i, 2], place[i, 3]
+        x, y, z, radius = place[i, X], place[i, Y], place[i, Z], place[i, RADIUS]
         for p in range(start[i], start[i + 1]):
             j = partner[p]
-            dx, dy, dz = place[j, 0] - x, place[j, 1] - y, place[j, 2] - z
-            radii = radius + place[j, 3]
+            dx, dy, dz = place[j, X] - x, place[j, Y] - y, place[j, Z] - z
+            radii = radius + place[j, RADIUS]
             gap = radii * radii - (dx * dx + dy * dy + dz * dz)
             at = base + count
             # Written in any case: whether a pair touches cannot be predicted.

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from castblast.muckpile.balls.columns import HELD, MASS, RADIUS
 from castblast.muckpile.balls.contact import ContactLaw, damped_step_factor, law_constants
 from castblast.muckpile.balls.particles import Particles, ball_mass
 from castblast.muckpile.balls.state import PRECISIONS, Balls, Contacts, make_contacts
@@ -116,8 +117,8 @@ class Simulation:
         motion = np.zeros((count, 8), dtype=real)
         motion[:, 0:3] = given.velocity
         motion[:, 3:6] = given.angular_velocity
-        motion[:, 6] = ball_mass(given.radius, self.law.density)
-        motion[:, 7] = self.held
+        motion[:, MASS] = ball_mass(given.radius, self.law.density)
+        motion[:, HELD] = self.held
         motion[self.held, 0:6] = 0.0
         self._balls = Balls(
             place=np.column_stack([given.position, given.radius]),
@@ -209,7 +210,7 @@ class Simulation:
         balls = self._balls
         mask = chosen[balls.identity]
         balls.motion[mask, 0:3] = velocity[balls.identity[mask]]
-        balls.motion[mask, 7] = 0.0
+        balls.motion[mask, HELD] = 0.0
         with enough_threads(len(mask)):
             if self._renew_lists():
                 self._evaluate()
@@ -335,7 +336,7 @@ class Simulation:
         order, cell_start, grid = self._sort_balls(life, reach)
         balls, ledger = self._balls, self.keep_ledger
         real, place_of = balls.motion.dtype, inverse(order)
-        held = balls.motion[:, 7] != 0.0
+        held = balls.motion[:, HELD] != 0.0
         held = held if held.any() else held[:0]
         near = (balls.paths, held)
         guess = 1.1 * len(self._pairs.partner) / len(order) + 4.0
@@ -365,7 +366,7 @@ class Simulation:
         rows, lower, upper = straight_paths(self._balls.place, self._balls.motion, life)
         grid = make_grid(lower, upper, reach, len(rows))
         order, cell_start, self._slab = sort_by_cell(rows, grid, 0.5 * life)
-        paths = lay_out(rows, self._balls.place[:, 3], order, self.skin)
+        paths = lay_out(rows, self._balls.place[:, RADIUS], order, self.skin)
         del rows
         self._balls = self._balls._replace(paths=paths, identity=self._balls.identity[order])
         for name in ("place", "motion", "force"):

@@ -13,6 +13,20 @@ import numpy as np
 from numba import prange
 
 from castblast.kernel import inline_kernel, lean_kernel, parallel_kernel
+from castblast.muckpile.balls.columns import (
+    MASS,
+    RADIUS,
+    STIFFNESS,
+    VX,
+    VY,
+    VZ,
+    WX,
+    WY,
+    WZ,
+    X,
+    Y,
+    Z,
+)
 from castblast.muckpile.balls.contact import Constants, wall_stiffness
 from castblast.muckpile.balls.state import Balls, Contacts
 from castblast.muckpile.ground.walls import WallTable, wall_distance
@@ -60,18 +74,18 @@ def _add_pairs(
     place, start, partner = balls.place, pairs.start, pairs.partner
     touching, memory = pairs.touching, pairs.memory
     for i in range(first, last):
-        radius = place[i, 3]
+        radius = place[i, RADIUS]
         for p in range(start[i], start[i + 1]):
             if touching[p]:
                 j = partner[p]
                 along = (
-                    place[j, 0] - place[i, 0],
-                    place[j, 1] - place[i, 1],
-                    place[j, 2] - place[i, 2],
+                    place[j, X] - place[i, X],
+                    place[j, Y] - place[i, Y],
+                    place[j, Z] - place[i, Z],
                 )
-                other = place[j, 3]
+                other = place[j, RADIUS]
                 effective = radius * other / (radius + other)
-                kn = float(memory[p, 6])
+                kn = float(memory[p, STIFFNESS])
                 _add_stiffness(stiffness, i, along, kn, law.shear_ratio, radius, effective)
                 _add_stiffness(stiffness, j, along, kn, law.shear_ratio, other, effective)
 
@@ -92,23 +106,23 @@ def _least_of_balls(
     touching, memory = touches.touching, touches.memory
     least = np.inf
     for i in range(first, last):
-        mass, radius = motion[i, 6], place[i, 3]
+        mass, radius = motion[i, MASS], place[i, RADIUS]
         for p in range(start[i], start[i + 1]):
             if touching[p]:
                 _, normal = wall_distance(
-                    walls, partner[p], place[i, 0], place[i, 1], place[i, 2], radius
+                    walls, partner[p], place[i, X], place[i, Y], place[i, Z], radius
                 )
-                kn = float(memory[p, 6])
+                kn = float(memory[p, STIFFNESS])
                 _add_stiffness(stiffness, i, normal, kn, law.shear_ratio, radius, radius)
         alone = wall_stiffness(radius, law.modulus)
-        stiffest = max(stiffness[i, 0], stiffness[i, 1], stiffness[i, 2], alone)
+        stiffest = max(stiffness[i, X], stiffness[i, Y], stiffness[i, Z], alone)
         turning = max(
-            stiffness[i, 3],
-            stiffness[i, 4],
-            stiffness[i, 5],
+            stiffness[i, WX],
+            stiffness[i, WY],
+            stiffness[i, WZ],
             2.0 * alone * law.shear_ratio * radius * radius,
         )
-        speed = motion[i, 0] ** 2 + motion[i, 1] ** 2 + motion[i, 2] ** 2
+        speed = motion[i, VX] ** 2 + motion[i, VY] ** 2 + motion[i, VZ] ** 2
         least = min(
             least,
             mass / stiffest,
@@ -134,4 +148,4 @@ def _add_stiffness(
     for axis in range(3):
         share = along[axis] * along[axis] / square
         stiffness[i, axis] += (kn - ks) * share + ks
-        stiffness[i, axis + 3] += ks * (radius * radius + effective * effective) * (1.0 - share)
+        stiffness[i, axis + WX] += ks * (radius * radius + effective * effective) * (1.0 - share)

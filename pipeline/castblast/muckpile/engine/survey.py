@@ -12,6 +12,7 @@ import numpy as np
 from numba import prange
 
 from castblast.kernel import lean_kernel, parallel_kernel
+from castblast.muckpile.balls.columns import MASS, RADIUS, WX, X, Y, Z
 from castblast.muckpile.balls.contact import Constants, spring_energy
 from castblast.muckpile.balls.state import Balls, Contacts
 from castblast.muckpile.engine.threads import require_threads
@@ -21,6 +22,11 @@ from castblast.types import FloatArray, IntArray, RealArray
 
 #: Overlap over the radius of the smaller ball from which a contact counts as deep.
 DEEP = 0.5
+
+# Columns of the sums over balls: mass, m v^2, I w^2, and from the last on m times place.
+_MASS, _TRANSLATION, _ROTATION, _FIRST_MOMENT = 0, 1, 2, 3
+# Columns of the survey of a slab, in the order of `ContactSurvey`.
+_ENERGY, _LARGEST, _TOTAL, _CONTACTS, _WORST, _DEEP_ONES = 0, 1, 2, 3, 4, 5
 
 
 class BallSurvey(NamedTuple):
@@ -43,12 +49,12 @@ def survey_balls(balls: Balls) -> BallSurvey:
     """Energies and means of all balls."""
     require_threads()
     sums = _sum_balls(balls).sum(axis=0)
-    mass, translation, rotation = map(float, sums[0:3])
+    mass, translation, rotation = map(float, sums[:_FIRST_MOMENT])
     return BallSurvey(
         mass=mass,
         translational_energy=0.5 * translation,
         rotational_energy=0.5 * rotation,
-        centre_of_mass=sums[3:6] / mass,
+        centre_of_mass=sums[_FIRST_MOMENT:] / mass,
     )
 
 
@@ -69,15 +75,15 @@ def _sum_piece(
     place: FloatArray, motion: RealArray, first: int, last: int, sums: FloatArray, piece: int
 ) -> None:
     for i in range(first, last):
-        mass = float(motion[i, 6])
+        mass = float(motion[i, MASS])
         speed, spin = 0.0, 0.0
         for axis in range(3):
             speed += float(motion[i, axis]) ** 2
-            spin += float(motion[i, axis + 3]) ** 2
-            sums[piece, 3 + axis] += mass * place[i, axis]
-        sums[piece, 0] += mass
-        sums[piece, 1] += mass * speed
-        sums[piece, 2] += 0.4 * mass * place[i, 3] * place[i, 3] * spin
+            spin += float(motion[i, axis + WX]) ** 2
+            sums[piece, _FIRST_MOMENT + axis] += mass * place[i, axis]
+        sums[piece, _MASS] += mass
+        sums[piece, _TRANSLATION] += mass * speed
+        sums[piece, _ROTATION] += 0.4 * mass * place[i, RADIUS] * place[i, RADIUS] * spin
 
 
 @parallel_kernel
@@ -88,7 +94,7 @@ def first_bad_ball(balls: Balls, farthest: float) -> int:
     bad = np.full(PIECES, count)
     for piece in prange(PIECES):
         for i in range(piece * count // PIECES, (piece + 1) * count // PIECES):
-            far = abs(place[i, 0]) + abs(place[i, 1]) + abs(place[i, 2])
+            far = abs(place[i, X]) + abs(place[i, Y]) + abs(place[i, Z])
             fast = 0.0
             for axis in range(6):
                 fast += abs(motion[i, axis])
@@ -161,14 +167,14 @@ def survey_contacts(
     require_threads()
     rows = np.zeros((len(slab) - 1, 6))
     _survey_slabs(balls, pairs, touches, walls, slab, law, rows)
-    deepest = int(np.argmax(rows[:, 1]))
+    deepest = int(np.argmax(rows[:, _LARGEST]))
     energy, _, total, contacts, _, deep = map(float, rows.sum(axis=0))
     return ContactSurvey(
         energy=energy,
-        largest_overlap=float(rows[deepest, 1]),
+        largest_overlap=float(rows[deepest, _LARGEST]),
         total_overlap=total,
         contacts=int(contacts),
-        worst=int(rows[deepest, 4]),
+        worst=int(rows[deepest, _WORST]),
         deep_share=deep / len(balls.place),
     )
 
@@ -195,24 +201,24 @@ def _survey_pairs(
     place, start, partner = balls.place, pairs.start, pairs.partner
     touching, memory = pairs.touching, pairs.memory
     for i in range(first, last):
-        radius = place[i, 3]
+        radius = place[i, RADIUS]
         for p in range(start[i], start[i + 1]):
             if touching[p]:
                 j = partner[p]
                 square = 0.0
                 for axis in range(3):
                     square += (place[j, axis] - place[i, axis]) ** 2
-                radii = radius + place[j, 3]
+                radii = radius + place[j, RADIUS]
                 overlap = radii - sqrt(square)
-                effective = radius * place[j, 3] / radii
-                rows[s, 0] += spring_energy(memory, p, overlap, effective, law.shear_ratio)
-                share = overlap / min(radius, place[j, 3])
-                if share > rows[s, 1]:
-                    rows[s, 1], rows[s, 4] = share, i
+                effective = radius * place[j, RADIUS] / radii
+                rows[s, _ENERGY] += spring_energy(memory, p, overlap, effective, law.shear_ratio)
+                share = overlap / min(radius, place[j, RADIUS])
+                if share > rows[s, _LARGEST]:
+                    rows[s, _LARGEST], rows[s, _WORST] = share, i
                 if share > DEEP:
-                    rows[s, 5] += 1.0
-                rows[s, 2] += overlap
-                rows[s, 3] += 1.0
+                    rows[s, _DEEP_ONES] += 1.0
+                rows[s, _TOTAL] += overlap
+                rows[s, _CONTACTS] += 1.0
 
 
 @lean_kernel
@@ -229,15 +235,15 @@ def _survey_walls(
     place, start, partner = balls.place, touches.start, touches.partner
     touching, memory = touches.touching, touches.memory
     for i in range(first, last):
-        radius = place[i, 3]
+        radius = place[i, RADIUS]
         for p in range(start[i], start[i + 1]):
             if touching[p]:
                 distance, _ = wall_distance(
-                    walls, partner[p], place[i, 0], place[i, 1], place[i, 2], radius
+                    walls, partner[p], place[i, X], place[i, Y], place[i, Z], radius
                 )
                 overlap = radius - distance
-                rows[s, 0] += spring_energy(memory, p, overlap, radius, law.shear_ratio)
-                if overlap > rows[s, 1] * radius:
-                    rows[s, 1], rows[s, 4] = overlap / radius, i
+                rows[s, _ENERGY] += spring_energy(memory, p, overlap, radius, law.shear_ratio)
+                if overlap > rows[s, _LARGEST] * radius:
+                    rows[s, _LARGEST], rows[s, _WORST] = overlap / radius, i
                 if overlap > DEEP * radius:
-                    rows[s, 5] += 1.0
+                    rows[s, _DEEP_ONES] += 1.0

@@ -8,7 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from castblast.kernel import kernel
-from castblast.muckpile.ground.facets import FACET_WORDS, LEVEL, LEVEL_COSINE, WallTable
+from castblast.muckpile.ground.facets import (
+    FACET_DEPTH,
+    FACET_FRICTION,
+    FACET_ROLLING,
+    FACET_WORDS,
+    GRID_REACH,
+    LEVEL,
+    LEVEL_COSINE,
+    WallTable,
+)
 from castblast.types import FloatArray, Int32Array, IntArray
 
 #: Corners at both ends of the edges ab, bc, ca.
@@ -81,12 +90,13 @@ def make_table(
     edge_normal, corner_normal = _feature_normals(corner, normal, number, places, base)
     row[:, 12:21] = edge_normal.reshape(count, 9)
     row[:, 21:30] = corner_normal.reshape(count, 9)
-    row[:, 30], row[:, 31], row[:, 32] = friction, rolling_friction, depth
+    row[:, FACET_FRICTION], row[:, FACET_ROLLING] = friction, rolling_friction
+    row[:, FACET_DEPTH] = depth
     start, around, shared = _neighbours(corner, normal, number, places)
     plan = corner[:, :, 0:2]
     cell_start, cell, span, grid = _lay_grid(plan.min(axis=1), plan.max(axis=1))
     # Behind a slope of 45 degrees the nearest point lies 0.7 of the depth aside.
-    grid[6] = max(1.0, 0.7 * float(depth.max()))
+    grid[GRID_REACH] = max(1.0, 0.7 * float(depth.max()))
     return WallTable(
         plane=plane,
         facet=row,

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from castblast.kernel import inline_kernel, kernel, lean_kernel
+from castblast.muckpile.balls.columns import RADIUS, X, Y, Z
 from castblast.muckpile.balls.contact import Vector
 from castblast.types import FloatArray, Int32Array, IntArray, RealArray
 
@@ -27,7 +28,12 @@ from castblast.types import FloatArray, Int32Array, IntArray, RealArray
 #: (9), friction, rolling friction, depth. NaN in the normal of an edge or corner: it cannot be
 #: touched; zeros: it can from all sides.
 FACET_WORDS = 33
-FACET_FRICTION, FACET_ROLLING, _DEPTH = 30, 31, 32
+# Corners a, b, c and normal; of the normals of edges and corners the first word.
+_AX, _AY, _AZ, _BX, _BY, _BZ, _CX, _CY, _CZ, _NX, _NY, _NZ = range(12)
+_ALONG_AB, _ALONG_BC, _ALONG_CA, _AT_A, _AT_B, _AT_C = 12, 15, 18, 21, 24, 27
+FACET_FRICTION, FACET_ROLLING, FACET_DEPTH = 30, 31, 32
+#: Of `WallTable.grid`.
+_LOW_X, _LOW_Y, _PER_X, _PER_Y, _CELLS_X, _CELLS_Y, GRID_REACH = range(7)
 #: Bit of `shared` for neighbours that make one contact with this facet where both are touched.
 LEVEL = 8
 #: Cosine of the angle between two contacts below which they are one: 20 degrees.
@@ -89,13 +95,13 @@ def nearest_point(
 
     The feature is 0 for the face, otherwise the bits of the corners of the edge or corner.
     """
-    ux, uy, uz = row[k, 3] - row[k, 0], row[k, 4] - row[k, 1], row[k, 5] - row[k, 2]
-    vx, vy, vz = row[k, 6] - row[k, 0], row[k, 7] - row[k, 1], row[k, 8] - row[k, 2]
-    ax, ay, az = x - row[k, 0], y - row[k, 1], z - row[k, 2]
+    ux, uy, uz = row[k, _BX] - row[k, _AX], row[k, _BY] - row[k, _AY], row[k, _BZ] - row[k, _AZ]
+    vx, vy, vz = row[k, _CX] - row[k, _AX], row[k, _CY] - row[k, _AY], row[k, _CZ] - row[k, _AZ]
+    ax, ay, az = x - row[k, _AX], y - row[k, _AY], z - row[k, _AZ]
     d1, d2 = ux * ax + uy * ay + uz * az, vx * ax + vy * ay + vz * az
-    bx, by, bz = x - row[k, 3], y - row[k, 4], z - row[k, 5]
+    bx, by, bz = x - row[k, _BX], y - row[k, _BY], z - row[k, _BZ]
     d3, d4 = ux * bx + uy * by + uz * bz, vx * bx + vy * by + vz * bz
-    cx, cy, cz = x - row[k, 6], y - row[k, 7], z - row[k, 8]
+    cx, cy, cz = x - row[k, _CX], y - row[k, _CY], z - row[k, _CZ]
     d5, d6 = ux * cx + uy * cy + uz * cz, vx * cx + vy * cy + vz * cz
     va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
     if d1 <= 0.0 and d2 <= 0.0:
@@ -115,8 +121,8 @@ def nearest_point(
         feature = 6
         px, py, pz = bx - s * (vx - ux), by - s * (vy - uy), bz - s * (vz - uz)
     else:
-        h = ax * row[k, 9] + ay * row[k, 10] + az * row[k, 11]
-        feature, px, py, pz = 0, h * row[k, 9], h * row[k, 10], h * row[k, 11]
+        h = ax * row[k, _NX] + ay * row[k, _NY] + az * row[k, _NZ]
+        feature, px, py, pz = 0, h * row[k, _NX], h * row[k, _NY], h * row[k, _NZ]
     return px * px + py * py + pz * pz, px, py, pz, feature
 
 
@@ -124,14 +130,14 @@ def nearest_point(
 def _normal_word(feature: int) -> int:
     """First word of the normal that belongs to a feature."""
     if feature == 0:
-        return 9
+        return _NX
     if feature == 3:
-        return 12
+        return _ALONG_AB
     if feature == 6:
-        return 15
+        return _ALONG_BC
     if feature == 5:
-        return 18
-    return 21 if feature == 1 else 24 if feature == 2 else 27
+        return _ALONG_CA
+    return _AT_A if feature == 1 else _AT_B if feature == 2 else _AT_C
 
 
 @lean_kernel
@@ -189,8 +195,8 @@ def facet_distance(
     nx, ny, nz = row[k, word], row[k, word + 1], row[k, word + 2]
     side = px * nx + py * ny + pz * nz
     # A rim has no side: its normal is zero.
-    within = radius if side >= 0.0 else radius * row[k, _DEPTH]
-    up = (row[k, 9], row[k, 10], row[k, 11])
+    within = radius if side >= 0.0 else radius * row[k, FACET_DEPTH]
+    up = (row[k, _NX], row[k, _NY], row[k, _NZ])
     if not square < within * within or nx != nx:
         return inf, up
     if _hidden(table, k, x, y, z, square, (px, py, pz), feature):
@@ -222,11 +228,11 @@ def near_facets(
     if len(table.facet) == 0:
         return count
     row, grid, planes = table.facet, table.grid, len(table.plane)
-    wide, ny = reach * grid[6], int(grid[5])
-    low_x = max(int(np.floor((x - wide - grid[0]) * grid[2])), 0)
-    high_x = min(int(np.floor((x + wide - grid[0]) * grid[2])), int(grid[4]) - 1)
-    low_y = max(int(np.floor((y - wide - grid[1]) * grid[3])), 0)
-    high_y = min(int(np.floor((y + wide - grid[1]) * grid[3])), ny - 1)
+    wide, ny = reach * grid[GRID_REACH], int(grid[_CELLS_Y])
+    low_x = max(int(np.floor((x - wide - grid[_LOW_X]) * grid[_PER_X])), 0)
+    high_x = min(int(np.floor((x + wide - grid[_LOW_X]) * grid[_PER_X])), int(grid[_CELLS_X]) - 1)
+    low_y = max(int(np.floor((y - wide - grid[_LOW_Y]) * grid[_PER_Y])), 0)
+    high_y = min(int(np.floor((y + wide - grid[_LOW_Y]) * grid[_PER_Y])), ny - 1)
     for cx in range(low_x, high_x + 1):
         for cy in range(low_y, high_y + 1):
             c = cx * ny + cy
@@ -236,8 +242,8 @@ def near_facets(
                 if cx != max(table.span[k, 0], low_x) or cy != max(table.span[k, 1], low_y):
                     continue
                 square, px, py, pz, _ = nearest_point(row, k, x, y, z)
-                behind = px * row[k, 9] + py * row[k, 10] + pz * row[k, 11] < 0.0
-                within = reach * max(row[k, _DEPTH], 1.0) if behind else reach
+                behind = px * row[k, _NX] + py * row[k, _NY] + pz * row[k, _NZ] < 0.0
+                within = reach * max(row[k, FACET_DEPTH], 1.0) if behind else reach
                 if square < within * within:
                     if at >= 0:
                         found[at + count] = planes + k
@@ -249,10 +255,10 @@ def near_facets(
 def facet_height(table: WallTable, x: FloatArray, y: FloatArray, height: FloatArray) -> None:
     """Raise `height` (n,) [m] to that of the highest facet that faces up at x (n,), y (n,)."""
     row, grid = table.facet, table.grid
-    nx, ny = int(grid[4]), int(grid[5])
+    nx, ny = int(grid[_CELLS_X]), int(grid[_CELLS_Y])
     for n in range(len(x)):
-        i = int(np.floor((x[n] - grid[0]) * grid[2]))
-        j = int(np.floor((y[n] - grid[1]) * grid[3]))
+        i = int(np.floor((x[n] - grid[_LOW_X]) * grid[_PER_X]))
+        j = int(np.floor((y[n] - grid[_LOW_Y]) * grid[_PER_Y]))
         # The upper rim belongs to the last cell.
         i = i - 1 if i == nx else i
         j = j - 1 if j == ny else j
@@ -261,16 +267,16 @@ def facet_height(table: WallTable, x: FloatArray, y: FloatArray, height: FloatAr
         c = i * ny + j
         for q in range(table.cell_start[c], table.cell_start[c + 1]):
             k = table.cell[q]
-            if row[k, 11] <= 1e-9:
+            if row[k, _NZ] <= 1e-9:
                 continue
-            ux, uy = row[k, 3] - row[k, 0], row[k, 4] - row[k, 1]
-            vx, vy = row[k, 6] - row[k, 0], row[k, 7] - row[k, 1]
-            px, py = x[n] - row[k, 0], y[n] - row[k, 1]
+            ux, uy = row[k, _BX] - row[k, _AX], row[k, _BY] - row[k, _AY]
+            vx, vy = row[k, _CX] - row[k, _AX], row[k, _CY] - row[k, _AY]
+            px, py = x[n] - row[k, _AX], y[n] - row[k, _AY]
             area = ux * vy - uy * vx
             s, t = (px * vy - py * vx) / area, (ux * py - uy * px) / area
             if s >= -1e-12 and t >= -1e-12 and s + t <= 1.0 + 1e-12:
-                rise = (row[k, 9] * px + row[k, 10] * py) / row[k, 11]
-                height[n] = max(height[n], row[k, 2] - rise)
+                rise = (row[k, _NX] * px + row[k, _NY] * py) / row[k, _NZ]
+                height[n] = max(height[n], row[k, _AZ] - rise)
 
 
 @lean_kernel
@@ -291,7 +297,7 @@ def hand_over(
     walls of the ball.
     """
     planes = len(table.plane)
-    x, y, z, radius = place[i, 0], place[i, 1], place[i, 2], place[i, 3]
+    x, y, z, radius = place[i, X], place[i, Y], place[i, Z], place[i, RADIUS]
     for p in range(first, last):
         if not touching[p] or partner[p] < planes:
             continue

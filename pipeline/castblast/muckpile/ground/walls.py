@@ -234,7 +234,9 @@ def ground_height(walls: Walls, x: FloatArray, y: FloatArray) -> FloatArray:
     return height
 
 
-#: Last columns of `WallTable.plane`.
+# Columns of `WallTable.plane`: origin, axes, normal, bounds along both axes, and the rest.
+_OX, _OY, _OZ, _UX, _UY, _UZ, _VX, _VY, _VZ, _NX, _NY, _NZ = range(12)
+_LOW_U, _HIGH_U, _LOW_V, _HIGH_V = 12, 13, 14, 15
 _FRICTION, _ROLLING, _RIM, _ENDLESS = 16, 17, 18, 19
 
 
@@ -321,22 +323,22 @@ def _plane_distance(
     beside the face it is that to the rim. It is infinite where the ball cannot touch the wall:
     at a rim that must not be touched, and wholly behind a wall that ends somewhere.
     """
-    rx, ry, rz = x - table[k, 0], y - table[k, 1], z - table[k, 2]
-    s = rx * table[k, 3] + ry * table[k, 4] + rz * table[k, 5]
-    t = rx * table[k, 6] + ry * table[k, 7] + rz * table[k, 8]
-    h = rx * table[k, 9] + ry * table[k, 10] + rz * table[k, 11]
-    over_s = s - min(max(s, table[k, 12]), table[k, 13])
-    over_t = t - min(max(t, table[k, 14]), table[k, 15])
+    rx, ry, rz = x - table[k, _OX], y - table[k, _OY], z - table[k, _OZ]
+    s = rx * table[k, _UX] + ry * table[k, _UY] + rz * table[k, _UZ]
+    t = rx * table[k, _VX] + ry * table[k, _VY] + rz * table[k, _VZ]
+    h = rx * table[k, _NX] + ry * table[k, _NY] + rz * table[k, _NZ]
+    over_s = s - min(max(s, table[k, _LOW_U]), table[k, _HIGH_U])
+    over_t = t - min(max(t, table[k, _LOW_V]), table[k, _HIGH_V])
     if over_s == 0.0 and over_t == 0.0:
         if h < -radius and table[k, _ENDLESS] == 0.0:
             return inf, (0.0, 0.0, 1.0)
-        return h, (table[k, 9], table[k, 10], table[k, 11])
+        return h, (table[k, _NX], table[k, _NY], table[k, _NZ])
     if table[k, _RIM] == 0.0:
         return inf, (0.0, 0.0, 1.0)
     distance = sqrt(h * h + over_s * over_s + over_t * over_t)
     a, b, c = over_s / distance, over_t / distance, h / distance
     return distance, (
-        a * table[k, 3] + b * table[k, 6] + c * table[k, 9],
-        a * table[k, 4] + b * table[k, 7] + c * table[k, 10],
-        a * table[k, 5] + b * table[k, 8] + c * table[k, 11],
+        a * table[k, _UX] + b * table[k, _VX] + c * table[k, _NX],
+        a * table[k, _UY] + b * table[k, _VY] + c * table[k, _NY],
+        a * table[k, _UZ] + b * table[k, _VZ] + c * table[k, _NZ],
     )
