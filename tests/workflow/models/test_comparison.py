@@ -1,5 +1,6 @@
 """Comparisons that are stopped, repeated and shared out; the lab book read without its library."""
 
+import csv
 import json
 import os
 import time
@@ -249,6 +250,46 @@ def test_the_book_holds_fits_with_their_data_and_the_champion(whole: Path) -> No
     signature = (model / "artifacts" / "MLmodel").read_text()
     assert "signature:" in signature
     assert "burden_velocity" in signature
+
+
+def test_the_parent_run_shows_the_champion_and_its_errors(whole: Path) -> None:
+    """Name, errors in percent as in the league, and a description that says both."""
+    _, runs = _book(whole)
+    (parent,) = [run for run in runs.values() if run.data.tags["stage"] == "compare"]
+    league = json.loads((whole / "comparison" / "comparison.json").read_text())
+    chosen = next(entry for entry in league["league"] if entry["name"] == league["chosen"])
+    assert parent.data.tags["champion"] == league["chosen"]
+    for key in ("valid_error", "test_error"):
+        assert parent.data.metrics[f"{key}_percent"] == pytest.approx(100 * chosen[key], rel=1e-12)
+    note = parent.data.tags["mlflow.note.content"]
+    for said in (
+        f"Champion: `{league['chosen']}`", f"test error {chosen['test_error']:.2%}",
+        f"validation error {chosen['valid_error']:.2%}", "dataset `toy` 1.", " test rows; 3 models",
+        "ranked by validation rows",
+    ):  # fmt: skip
+        assert said in note, note
+    assert f"{league['test_rows']} test rows" in note
+
+
+def test_metrics_for_dvc_are_flat_and_those_of_the_league(whole: Path) -> None:
+    """One number per key and no times; the table of errors has the order of the league."""
+    metrics = json.loads((whole / "comparison" / "metrics.json").read_text())
+    league = json.loads((whole / "comparison" / "comparison.json").read_text())
+    assert metrics.pop("champion") == league["chosen"]
+    assert all(isinstance(value, int | float) for value in metrics.values())
+    assert not any("seconds" in key for key in metrics)
+    assert metrics["rows_test"] == league["test_rows"]
+    chosen = next(entry for entry in league["league"] if entry["name"] == league["chosen"])
+    for target, figures in chosen["targets"].items():
+        p95 = metrics[f"test_p95_percent_{target}"]
+        assert p95 == pytest.approx(100 * figures["relative_error_95"], rel=1e-12)
+        assert 0.0 < metrics[f"test_median_percent_{target}"] < p95
+    with (whole / "comparison" / "league.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["model"] for row in rows] == [entry["name"] for entry in league["league"]]
+    for row, entry in zip(rows, league["league"], strict=True):
+        for key in ("valid_error", "test_error"):
+            assert float(row[f"{key}_percent"]) == pytest.approx(100 * entry[key], rel=1e-12)
 
 
 def test_runs_are_listed(whole: Path, capsys: pytest.CaptureFixture[str]) -> None:

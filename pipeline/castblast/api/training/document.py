@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -36,7 +37,7 @@ def write_comparison(
     from castblast.network.json_file import to_json
     from castblast.surrogate.judging.timing import timings
 
-    files = [write_json(out / "comparison.json", document)]
+    files = [write_json(out / "comparison.json", document), *write_figures(out, found)]
     files += draw_comparison(out, found, document)
     network = out / "network.json"
     if found.league["chosen"] and found.chosen.network is not None:
@@ -49,6 +50,25 @@ def write_comparison(
     times = {"models": costs, "parts": dict(found.times), "comparison_seconds": seconds}
     files.append(write_json(out / "timings.json", times))
     return files
+
+
+def write_figures(out: Path, found: Comparison) -> list[Path]:
+    """Write the errors at first sight, as DVC shows them: ``metrics.json`` and ``league.csv``.
+
+    Like ``comparison.json`` they hold no times: the same bytes every time.
+    """
+    from castblast.surrogate.judging.champion import champion_figures, percent
+
+    league = found.league
+    metrics = {"champion": league["chosen"] or "none", **champion_figures(found.fits, league)}
+    columns: dict[str, Any] = {"model": [entry["name"] for entry in league["league"]]}
+    for key in ("valid_error", "test_error"):
+        errors = [percent(entry[key]) for entry in league["league"]]  # type: ignore[literal-required]
+        columns[f"{key}_percent"] = [math.nan if error is None else error for error in errors]
+    return [
+        write_json(out / "metrics.json", metrics),
+        write_csv(out / "league.csv", columns),
+    ]
 
 
 def draw_comparison(out: Path, found: Comparison, document: ComparisonDocument) -> list[Path]:

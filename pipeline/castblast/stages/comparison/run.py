@@ -60,8 +60,8 @@ def compare(
         Model specs (YAML) or folders of them; none: those of the folder of fits, or all that come
         with castblast.
     out : path, optional
-        Folder for ``comparison.json``, ``report.html`` and pictures; default ``comparison``
-        beside the dataset.
+        Folder for ``comparison.json``, ``metrics.json``, ``league.csv``, ``report.html`` and
+        pictures; default ``comparison`` beside the dataset.
     fits : path, optional
         Folder of the fits; default ``fits`` beside the dataset.
     extent : Extent

@@ -94,7 +94,7 @@ def tune(
     if tracking:
         from castblast.surrogate.keeping.tracking import MlflowTracker
 
-        MlflowTracker(runs).record_study(result, table.source, files)
+        MlflowTracker(runs).record_study(result, table, files)
     return _outcome(result, folder, journal)
 
 

@@ -15,16 +15,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from castblast.disk.plain import finite
-from castblast.surrogate.fitting.features import SPLITS
+from castblast.surrogate.fitting.features import SPLITS, Table
 from castblast.surrogate.fitting.training import Fit, LearningPoint
+from castblast.surrogate.judging.champion import champion_figures, percent
 from castblast.surrogate.keeping.lab_book import open_store
 from castblast.surrogate.keeping.logged_model import log_model
+from castblast.surrogate.keeping.notes import comparison_note, study_note
 from castblast.version import __version__
 
 if TYPE_CHECKING:
+    from castblast.surrogate.judging.comparison import League
     from castblast.surrogate.searching.tuning import StudyResult
 
 Files = Mapping[str, Sequence[Path]]
+#: Tag under which MLflow keeps the description of a run, in Markdown.
+_NOTE = "mlflow.note.content"
 
 
 class MlflowTracker:
@@ -54,41 +59,52 @@ class MlflowTracker:
     def record_comparison(
         self,
         fits: Sequence[Fit],
-        comparison: Mapping[str, Any],
+        league: League,
         files: Files,
         curves: Mapping[str, Sequence[LearningPoint]],
     ) -> None:
         """Keep a comparison: its files, one child run per fit, and the chosen model registered.
 
+        The parent run carries name and errors of the champion and says them in its description.
         The chosen model is a new version of ``castblast_<dataset>`` with the alias ``champion``.
 
         Parameters
         ----------
         fits : sequence of Fit
-        comparison : mapping
-            With ``chosen``.
+        league : League
         files : mapping of spec name to sequence of path
             Files of each fit; those of the comparison under the empty name.
         curves : mapping of spec name to learning curve
         """
         source = dict(fits[0].table.source)
         with self._parent(source, "compare") as mlflow:
-            mlflow.log_dict(dict(comparison), "comparison.json")
-            mlflow.set_tag("chosen", comparison["chosen"])
+            figures = champion_figures(fits, league)
+            mlflow.log_metrics(_finite(figures))
+            note = comparison_note(league, figures)
+            mlflow.set_tags({"champion": league["chosen"] or "none", _NOTE: note})
             _log_files(mlflow, files.get("", ()))
             for fit in fits:
                 name, register = fit.spec.name, None
-                if name == comparison["chosen"]:
+                if name == league["chosen"]:
                     register = f"castblast_{source.get('name', 'dataset')}"
                 _record_fit(mlflow, fit, files.get(name, ()), curves.get(name, ()), register)
 
-    def record_study(
-        self, study: StudyResult, source: Mapping[str, str], files: Sequence[Path]
-    ) -> None:
-        """Keep a study: its files and one child run without a model per trial."""
+    def record_study(self, study: StudyResult, table: Table, files: Sequence[Path]) -> None:
+        """Keep a study: its files, its best trial and one child run without a model per trial."""
+        source = table.source
         with self._parent(source, "tune") as mlflow:
-            mlflow.set_tags({"spec.sha256": study.spec.sha256(), "spec": study.identity["spec"]})
-            mlflow.log_metrics(_finite({"best_valid_error": study.best.error}))
+            tags = {"spec.sha256": study.spec.sha256(), "spec": study.identity["spec"]}
+            note = study_note(study, table)
+            mlflow.set_tags({**tags, "champion": study.spec.name, _NOTE: note})
+            mlflow.log_params({key: str(v) for key, v in study.best.settings.items()})
+            error = study.best.error
+            figures = {
+                "best_valid_error": error,
+                "valid_error_percent": percent(error),
+                "best_trial": study.best.number,
+                "parameters": study.best.parameters,
+            }
+            mlflow.log_metrics(_finite(figures))
             _log_files(mlflow, files)
             for trial in study.trials:
                 name = f"{study.identity['spec']}/trial {trial.number}"
