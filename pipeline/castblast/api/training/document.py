@@ -63,7 +63,7 @@ def write_figures(out: Path, found: Comparison) -> list[Path]:
     metrics = {"champion": league["chosen"] or "none", **champion_figures(found.fits, league)}
     columns: dict[str, Any] = {"model": [entry["name"] for entry in league["league"]]}
     for key in ("valid_error", "test_error"):
-        errors = [percent(entry[key]) for entry in league["league"]]  # type: ignore[literal-required]
+        errors = [percent(entry[key]) for entry in league["league"]]
         columns[f"{key}_percent"] = [math.nan if error is None else error for error in errors]
     return [
         write_json(out / "metrics.json", metrics),

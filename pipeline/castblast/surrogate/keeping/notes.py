@@ -38,7 +38,7 @@ def comparison_note(league: League, figures: Mapping[str, float | int | None]) -
         f"{_percent(figures[f'test_p95_percent_{target}'])}"
         for target in league["targets"]
     ]
-    counts = {split: int(figures[f"rows_{split}"] or 0) for split in SPLITS}
+    counts: dict[str, int] = {split: int(figures[f"rows_{split}"] or 0) for split in SPLITS}
     lines += [
         f"- dataset {_dataset(league['dataset'])}, {_rows(counts)}; {figures['models']} models",
         f"- ranked by validation rows: {league['rule']}; test rows decide nothing",
