@@ -159,6 +159,27 @@ def test_the_best_spec_is_a_complete_spec(whole, spec, table) -> None:
     assert (out / "importance.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_the_parent_run_shows_the_best_trial(folder: Path, tmp_path: Path) -> None:
+    """Its error in percent as in the study, no test error, and a description that says so."""
+    mlflow = pytest.importorskip("mlflow")
+    outcome = tune_stage(
+        folder / "toy.nc", folder / "tiny.yaml", trials=2, out=tmp_path / "study", tracking=True,
+        runs=tmp_path / "runs",
+    )  # fmt: skip
+    client = mlflow.MlflowClient(f"sqlite:///{tmp_path / 'runs' / 'mlflow.db'}")
+    (experiment,) = [e for e in client.search_experiments() if e.name == "toy/1"]
+    runs = client.search_runs([experiment.experiment_id])
+    (parent,) = [run for run in runs if run.data.tags["stage"] == "tune"]
+    assert parent.data.tags["champion"] == "tiny_tuned"
+    error = outcome.document["best_error"]
+    assert parent.data.metrics["valid_error_percent"] == pytest.approx(100 * error, rel=1e-12)
+    assert not any("test" in name for name in parent.data.metrics)
+    note = parent.data.tags["mlflow.note.content"]
+    for said in ("**Best: `tiny_tuned`**", f"validation error {error:.2%}", "2 trials of `tiny`",
+                 "test rows are not used"):  # fmt: skip
+        assert said in note, note
+
+
 def test_the_first_trial_is_the_spec_itself(whole, spec) -> None:
     """Its penalty of 0 lies outside the space, so nothing stands for it; inside, it is trial 0."""
     assert whole[0].document["trials"][0]["settings"] != {"hidden_layers": [5]}
