@@ -109,7 +109,7 @@ def test_the_journal_of_a_study(journal: bytes, tmp_path: Path) -> None:
 def test_deep_nesting_is_told(depth: int, tmp_path: Path) -> None:
     (tmp_path / "study.journal").write_bytes(b'{"op_code":' + b"[" * depth + b"\n")
     with (
-        pytest.raises(CastblastError, match="no journal of a study"),
+        pytest.raises(CastblastError, match="not a study journal"),
         hold_study(tmp_path / "study.journal"),
     ):
         pass

@@ -87,7 +87,7 @@ def test_an_index_that_names_no_rows_is_refused(model: "cb.Model") -> None:
     twice = pd.DataFrame([[3.0, 4.0]], columns=["burden", "burden"])
     with pytest.raises(SpecError, match="two columns"):
         model.predict(twice)
-    with pytest.raises(SpecError, match="no table"):
+    with pytest.raises(SpecError, match="is not a table"):
         model.predict("burden")
 
 

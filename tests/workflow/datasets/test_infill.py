@@ -132,7 +132,7 @@ def test_every_fault_of_a_design_file_is_named(made, tmp_path) -> None:
     recipe = read_existing(made).source.recipe
     path = tmp_path / "bad.csv"
     path.write_text("ucs [MPa],burden [m],spacing [m],charge_length [m],explosive\n")
-    with pytest.raises(SpecError, match="at least one row"):
+    with pytest.raises(SpecError, match="no data rows"):
         read_design_file(path, recipe, EXPLOSIVES)
     path.write_text("ucs [MPa],burdn [m],spacing [m],explosive\n80,3,3,anfo\n")
     with pytest.raises(SpecError) as fault:
