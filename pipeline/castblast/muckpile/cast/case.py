@@ -10,6 +10,7 @@ from castblast.errors import Status
 from castblast.muckpile.balls.contact import ContactLaw, check_law
 from castblast.muckpile.balls.particles import Particles
 from castblast.muckpile.balls.state import PRECISIONS
+from castblast.muckpile.cast.ledger import EnergyLedger
 from castblast.muckpile.ground.walls import Walls
 from castblast.types import FloatArray, IntArray
 
@@ -96,35 +97,6 @@ class CastHistory(NamedTuple):
     rotational_energy: FloatArray
     centre_of_mass: FloatArray
     contacts: IntArray
-
-
-class EnergyLedger(NamedTuple):
-    """Where the energy went; all in J but the residual.
-
-    Attributes
-    ----------
-    initial : float
-        Kinetic, potential and elastic energy at the start.
-    fired : float
-        Kinetic energy added by the firing of blocks.
-    kinetic, potential, spring : float
-        At the end.
-    slip, rolling_slip, dashpot : float
-        Dissipated on the way; NaN when not recorded.
-    residual : float [-]
-        Open balance over the largest of: energy put in by firing, potential energy released, and
-        kinetic energy at the start.
-    """
-
-    initial: float
-    fired: float
-    kinetic: float
-    potential: float
-    spring: float
-    slip: float
-    rolling_slip: float
-    dashpot: float
-    residual: float
 
 
 class CastCounters(NamedTuple):

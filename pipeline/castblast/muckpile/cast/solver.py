@@ -25,9 +25,10 @@ from castblast.muckpile.cast.case import (
     CastCounters,
     CastHistory,
     CastResult,
-    EnergyLedger,
     check_case,
 )
+from castblast.muckpile.cast.firing import fire_blocks
+from castblast.muckpile.cast.ledger import EnergyLedger, close_ledger, mechanical_energy
 from castblast.muckpile.cast.restart import INTERVAL, Arrays, Keeper, Kept, case_hash
 from castblast.muckpile.engine.simulation import Simulation
 from castblast.muckpile.engine.threads import thread_count
@@ -205,7 +206,7 @@ def _run_to_rest(
             part.resume(kept)
     else:
         record.add(run)
-        record.initial = _mechanical_energy(case, run)
+        record.initial = mechanical_energy(run, case.gravity)
         if snapshot:
             snapshot(0.0, run.state())
     next_picture = inf
@@ -219,7 +220,7 @@ def _run_to_rest(
             keeper.write(_state_of(parts))
             stop.obey(f"stopped at t = {run.clock:.2f} s of the cast; {keeper.how_to_go_on}")
         if len(firings) and run.clock >= firings[0]:
-            record.fired += _fire(case, run, float(firings[0]))
+            record.fired += fire_blocks(case, run, float(firings[0]))
             record.firings += 1
             firings = firings[1:]
         event = min(float(firings[0]), case.max_time) if len(firings) else case.max_time
@@ -254,7 +255,9 @@ def _run_to_rest(
         failed_ball=run.failed_ball,
         failed_time=run.clock if run.failed else nan,
         history=record.history(),
-        ledger=_close_ledger(case, run, record.initial, record.fired),
+        ledger=close_ledger(
+            run, case.gravity, record.initial, record.fired, recorded=case.keep_ledger
+        ),
         counters=CastCounters(
             steps=run.steps,
             rebuilds=run.rebuilds,
@@ -277,48 +280,3 @@ def _line(record: _Record) -> str:
     now, moving = record.rows[-1][0], record.rows[-1][1]
     ratio = moving / record.largest_energy if record.largest_energy > 0.0 else 0.0
     return f"t = {now:.2f} s, kinetic energy {100.0 * ratio:.3g} % of its maximum"
-
-
-def _fire(case: CastCase, run: Simulation, time: float) -> float:
-    """Give the blocks due at `time` their velocity; return the energy added [J].
-
-    With the velocity comes the load of contacts inside the block, which nobody asked for before.
-    """
-    block = case.particles.block
-    chosen = np.isin(block, np.flatnonzero(case.block_delay == time))
-    before = sum(_mechanical_energy(case, run))
-    velocity = np.zeros((len(block), 3))
-    velocity[chosen] = case.block_velocity[block[chosen]]
-    run.fire(chosen, velocity)
-    return sum(_mechanical_energy(case, run)) - before
-
-
-def _mechanical_energy(case: CastCase, run: Simulation) -> tuple[float, float, float]:
-    """Kinetic, potential and elastic energy [J] of the present state."""
-    balls = run.survey_balls()
-    kinetic = balls.translational_energy + balls.rotational_energy
-    potential = balls.mass * case.gravity * float(balls.centre_of_mass[2])
-    return kinetic, potential, run.survey_contacts().energy
-
-
-def _close_ledger(
-    case: CastCase, run: Simulation, initial: tuple[float, float, float], fired: float
-) -> EnergyLedger:
-    kinetic, potential, spring = _mechanical_energy(case, run)
-    spent = run.dissipated if case.keep_ledger else np.full(3, nan)
-    slip, rolling_slip, dashpot = map(float, spent)
-    before = sum(initial)
-    gone = slip + rolling_slip + dashpot
-    open_balance = before + fired - kinetic - potential - spring - gone
-    scale = max(abs(fired), abs(initial[1] - potential), initial[0], 1e-300)
-    return EnergyLedger(
-        initial=before,
-        fired=fired,
-        kinetic=kinetic,
-        potential=potential,
-        spring=spring,
-        slip=slip,
-        rolling_slip=rolling_slip,
-        dashpot=dashpot,
-        residual=open_balance / scale,
-    )
