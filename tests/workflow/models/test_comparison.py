@@ -212,7 +212,7 @@ def test_jobs_end_with_the_first_fault() -> None:
 
 
 def test_a_process_that_dies_is_said() -> None:
-    jobs = [Job("fit a", os._exit, (1,)), Job("fit b", time.sleep, (60,))]
+    jobs = [Job("fit a", os._exit, (1,)), Job("fit b", time.sleep, (600,))]
     with pytest.raises(SimulationError, match=r"a process died on one of: fit a, fit b"):
         run_jobs(jobs, workers=2)
 
